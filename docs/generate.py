@@ -95,7 +95,7 @@ def parameters_page() -> str:
         rows = [f"| `{name}` | {default} | {allowed} | {text} |"
                 for name, default, allowed, text in parameter_rows([group])]  # fmt: skip
         head = ["| parameter | default | allowed | meaning |", "|---|---|---|---|"]
-        parts += [f"## {group}", "\n".join([*head, *rows])]
+        parts += [f"## {group}", "\n".join([*head, *rows])] * bool(rows)
     return page(parts)
 
 

@@ -19,7 +19,7 @@ from teleop_core.graph.signals import TICK_NS
 from teleop_core.hand.master import hand_mechanics, haptic_master
 from teleop_core.hand.master.device import DeviceParameters
 from teleop_core.hand.operators import register_operator, rest
-from teleop_core.hand.operators.behaviour import ButtonParameters, OperatorParameters
+from teleop_core.hand.operators.behaviour import OperatorParameters, PressParameters
 from teleop_core.kernels.geometry import Array
 
 HALF = 2e-3  # from the middle of the box to its walls [m]
@@ -45,7 +45,7 @@ def session(
     own |= {key: hand[key] for key in hand if key.startswith("tremor")}
     person = build(OperatorParameters, own)
     master = HeldMaster(
-        replace(person, buttons=ButtonParameters(fixture=(0.002,))),
+        replace(person, buttons=PressParameters(fixture=(0.002,))),
         haptic_master.HapticMasterParameters(
             seed=seed,
             hand=hand_mechanics.HandParameters(**{k: v for k, v in hand.items() if k not in own}),

@@ -71,7 +71,7 @@ def test_a_live_session_is_recorded_on_every_topic(
     # One sample for each step, and none for the time that a busy machine dropped.
     assert (np.diff(measured.stamp_ns) % 1_000_000 == 0).all()
     statuses = {report.name: report for report in bag.reports(topics.DIAGNOSTICS)}
-    assert set(statuses) == {*BUILT_IN, RECORDER_NAME}
+    assert set(statuses) == {*BUILT_IN, RECORDER_NAME, "frames"}
     slave = statuses["slave_sim"]
     told = (measured.stamp_ns <= slave.stamp_ns).sum()
     assert int(slave.values["ticks"]) + float(slave.values["dropped_time_ms"]) >= told > 0

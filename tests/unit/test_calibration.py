@@ -18,9 +18,9 @@ from teleop_core.robots.arms.as_chain import true_chain
 from teleop_core.robots.robot import Robot
 from teleop_lab.calibration import (
     CalibrationError,
+    ChainModel,
     LinkErrors,
     Measured,
-    Model,
     appendix_e,
     calibrate,
     read_measured,
@@ -50,7 +50,7 @@ def kernel_tips(robot: Robot, errors: LinkErrors, q: Array) -> Array:
 
 
 def measured_at(robot: Robot, errors: LinkErrors, count: int, rng: np.random.Generator, noise: float = 0.0) -> Measured:
-    model = Model.of(robot)
+    model = ChainModel.of(robot)
     return tracked(model, errors, random_poses(robot, count, rng), noise, rng)
 
 
@@ -61,7 +61,7 @@ def measured_at(robot: Robot, errors: LinkErrors, count: int, rng: np.random.Gen
 def test_the_tip_of_the_model_is_that_of_the_kernels(name: str) -> None:
     robot, rng = load_robot(name), np.random.default_rng(1)
     q, errors = random_poses(robot, 30, rng), drawn_errors(robot.n, rng, 0.01)
-    tips = Model.of(robot).tips(q, np.concatenate((errors.vector, np.zeros(6))))
+    tips = ChainModel.of(robot).tips(q, np.concatenate((errors.vector, np.zeros(6))))
     assert np.allclose(tips, kernel_tips(robot, errors, q), rtol=0, atol=1e-14)
 
 
@@ -69,7 +69,7 @@ def test_the_tip_of_the_model_is_that_of_the_kernels(name: str) -> None:
 def test_slopes_of_the_tip_are_those_of_differences(name: str) -> None:
     robot, rng, step = load_robot(name), np.random.default_rng(2), 1e-6
     turn = Frame(Rotation.random(rng=rng).as_matrix(), rng.normal(0.0, 1.0, 3))
-    for model in (Model.of(robot), Model.of(robot, turn)):
+    for model in (ChainModel.of(robot), ChainModel.of(robot, turn)):
         q = random_poses(robot, 20, rng)
         vector = np.concatenate((rng.normal(0.0, 0.02, 4 * robot.n), np.zeros(6)))
         J = model.jacobian(q, vector)
@@ -98,7 +98,7 @@ def test_alignment_is_that_of_scipy() -> None:
 def test_errors_of_any_chain_are_found_from_points_without_noise(name: str) -> None:
     robot, rng = load_robot(name), np.random.default_rng(5)
     errors = drawn_errors(robot.n, rng)
-    found = identify(Model.of(robot), measured_at(robot, errors, 60, rng), "all")
+    found = identify(ChainModel.of(robot), measured_at(robot, errors, 60, rng), "all")
     fresh = random_poses(robot, 200, rng)
     now, true = (kernel_tips(robot, e, fresh) for e in (found.errors, errors))
     before = np.linalg.norm(kernel_tips(robot, LinkErrors.none(robot.n), fresh) - true, axis=1)
@@ -112,14 +112,14 @@ def test_an_arm_with_errors_that_can_be_told_apart_is_found_to_rounding() -> Non
     rng = np.random.default_rng(6)
     names = {"a2": 4e-4, "alpha1": 2e-3, "d3": 5.5e-3, "theta2": -3e-3, "theta5": 4e-3, "d6": 1e-3}
     errors = LinkErrors.of(RCRT1, names)
-    found = identify(Model.of(RCRT1), measured_at(RCRT1, errors, 30, rng), list(names))
+    found = identify(ChainModel.of(RCRT1), measured_at(RCRT1, errors, 30, rng), list(names))
     assert np.allclose(found.errors.vector, errors.vector, rtol=0, atol=1e-13)
     assert found.names == ("a2", "alpha1", "d3", "d6", "theta2", "theta5")
 
 
 @pytest.mark.parametrize("is_elsewhere", [False, True])
 def test_a_frame_that_nobody_knows_costs_no_accuracy(is_elsewhere: bool) -> None:
-    rng, model = np.random.default_rng(7), Model.of(RCRT1)
+    rng, model = np.random.default_rng(7), ChainModel.of(RCRT1)
     errors = LinkErrors.of(RCRT1, {"d3": 5.5e-3, "theta4": 2e-3})
     q = random_poses(RCRT1, 40, rng)
     measured = tracked(model, errors, q, 0.0, rng, is_elsewhere=is_elsewhere)
@@ -132,7 +132,7 @@ def test_a_frame_that_nobody_knows_costs_no_accuracy(is_elsewhere: bool) -> None
 
 
 def test_intervals_hold_the_truth_as_often_as_they_say() -> None:
-    names, rng, model = (["d3", "theta1", "theta2", "theta5"], np.random.default_rng(8), Model.of(RCRT1))
+    names, rng, model = (["d3", "theta1", "theta2", "theta5"], np.random.default_rng(8), ChainModel.of(RCRT1))
     errors, inside, trials = LinkErrors.of(RCRT1, {"d3": 1e-3, "theta2": 1e-3}), 0, 120
     true = errors.vector[[model.names.index(name) for name in names]]
     q = random_poses(RCRT1, 12, rng)
@@ -149,7 +149,7 @@ def test_intervals_hold_the_truth_as_often_as_they_say() -> None:
 
 def test_what_cannot_be_told_apart_is_named_with_what_it_acts_as() -> None:
     measured = measured_at(RCRT1, LinkErrors.none(6), 60, np.random.default_rng(10))
-    left = {entry.name: entry.reason for entry in identify(Model.of(RCRT1), measured, keeps_all=True).left}
+    left = {entry.name: entry.reason for entry in identify(ChainModel.of(RCRT1), measured, keeps_all=True).left}
     # On the tool's axis lies the tip: its turn does nothing. Slides along one axis are one, as
     # are turns about it; links 2 and 3 have parallel x axes.
     assert left["theta6"] == left["alpha6"] == "does not change what is measured"
@@ -162,8 +162,8 @@ def test_what_cannot_be_told_apart_is_named_with_what_it_acts_as() -> None:
 def test_errors_that_are_not_told_from_zero_stay_zero() -> None:
     rng = np.random.default_rng(12)
     measured = measured_at(RCRT1, LinkErrors.of(RCRT1, {"d3": 5.5e-3}), 40, rng, 1e-4)
-    kept = identify(Model.of(RCRT1), measured, keeps_all=True)
-    pruned = identify(Model.of(RCRT1), measured)
+    kept = identify(ChainModel.of(RCRT1), measured, keeps_all=True)
+    pruned = identify(ChainModel.of(RCRT1), measured)
     assert "d3" in pruned.names
     assert len(pruned.names) < 6 < len(kept.names)
     assert all(abs(v) >= h for v, h in zip(pruned.values, pruned.half_widths, strict=True))
@@ -208,7 +208,7 @@ def test_the_offset_of_d3_is_found_with_a_ruler_and_with_a_tracker() -> None:
 
 
 def test_a_ruler_reads_in_half_millimetres_along_one_axis_after_the_other() -> None:
-    measured = ruled(Model.of(RCRT1), LinkErrors.of(RCRT1, {"d3": 5.5e-3}), 30)
+    measured = ruled(ChainModel.of(RCRT1), LinkErrors.of(RCRT1, {"d3": 5.5e-3}), 30)
     halves = present(measured.distances) / 0.5e-3
     assert np.allclose(halves, np.round(halves), rtol=0, atol=1e-9)
     assert measured.labels == ("x",) * 10 + ("y",) * 10 + ("z",) * 10
@@ -233,7 +233,7 @@ def test_tolerances_are_drawn_within_their_width_and_values_replace_them() -> No
 @pytest.mark.parametrize("name", CHAINS)
 def test_chosen_poses_tell_more_than_random_ones(name: str) -> None:
     robot = load_robot(name)
-    model, worth = Model.of(robot), {}
+    model, worth = ChainModel.of(robot), {}
     rng = np.random.default_rng(13)
     names = identify(model, measured_at(robot, LinkErrors.none(robot.n), 60, rng, 1e-5), keeps_all=True).names
     at = [model.names.index(entry) for entry in names]
@@ -376,20 +376,20 @@ def test_too_few_poses_are_refused_with_how_many_it_takes() -> None:
     rng = np.random.default_rng(18)
     measured = measured_at(RCRT1, LinkErrors.none(6), 1, rng, 1e-4)
     with pytest.raises(CalibrationError, match="1 poses give 3 readings, too few for 4"):
-        identify(Model.of(RCRT1), measured, ["d3", "theta1", "theta2", "theta5"])
+        identify(ChainModel.of(RCRT1), measured, ["d3", "theta1", "theta2", "theta5"])
     with pytest.raises(CalibrationError, match="three poses"):
-        identify(Model.of(RCRT1), measured, ["d3"], finds_frame=True)
+        identify(ChainModel.of(RCRT1), measured, ["d3"], finds_frame=True)
 
 
 def test_named_errors_that_cannot_be_told_apart_are_refused() -> None:
     measured = measured_at(RCRT1, LinkErrors.none(6), 40, np.random.default_rng(19), 1e-4)
     with pytest.raises(CalibrationError, match=r"not identifiable.*d4 acts as d3"):
-        identify(Model.of(RCRT1), measured, ["d3", "d4"])
+        identify(ChainModel.of(RCRT1), measured, ["d3", "d4"])
     with pytest.raises(CalibrationError, match=r"not identifiable.*theta6 does not change"):
-        identify(Model.of(RCRT1), measured, ["theta6"])
+        identify(ChainModel.of(RCRT1), measured, ["theta6"])
     still = Measured(joints=np.tile(RCRT1.start, (9, 1)), points=np.tile([0.1, 0.2, 0.3], (9, 1)))
     with pytest.raises(CalibrationError, match="not identifiable"):
-        identify(Model.of(RCRT1), still, ["d3", "theta1", "theta2", "theta4", "theta5"])
+        identify(ChainModel.of(RCRT1), still, ["d3", "theta1", "theta2", "theta4", "theta5"])
 
 
 def test_measurements_of_another_arm_are_refused() -> None:
@@ -397,4 +397,4 @@ def test_measurements_of_another_arm_are_refused() -> None:
     q = random_poses(RCRT1, 40, rng)
     lost = Measured(joints=q, points=rng.uniform(-0.4, 0.4, (40, 3)))
     with pytest.raises(CalibrationError, match=r"far from the drawing|did not converge"):
-        identify(Model.of(RCRT1), lost, "offsets")
+        identify(ChainModel.of(RCRT1), lost, "offsets")

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from present import present
 from teleop_core.base.errors import SessionError
 from teleop_core.commands.cli import main
-from teleop_core.hand.devices import NOTHING, Reading, pilot, spacemouse
+from teleop_core.hand.devices import NOTHING, DeviceReading, pilot, spacemouse
 from teleop_core.hand.devices.gamepad import Gamepad
 from teleop_core.hand.operators import OPERATORS
 from teleop_core.hand.operators.remote import AHEAD, RemoteHand
@@ -36,7 +36,7 @@ class Session:
         self.pilot = pilot.Pilot(self.hand, pilot.PilotParameters(**parameters))
         self.rows, self._looks = np.zeros((0, 13)), 0
 
-    def for_time(self, duration: float, reading: Reading) -> Array:
+    def for_time(self, duration: float, reading: DeviceReading) -> Array:
         for _ in range(round(duration / DT / AHEAD)):
             while self._looks * 0.01 <= len(self.rows) * DT:
                 self.pilot.step(reading, 0.01)
@@ -66,7 +66,7 @@ def test_more_deflection_is_never_less_speed_and_nothing_jumps(zone: float, firs
 def test_full_deflection_moves_the_stylus_at_the_stated_speed(axis: int) -> None:
     run, rates = Session(speed=0.03), np.zeros(6)
     rates[axis] = -1.0
-    rows = run.for_time(1.0, Reading(rates, is_held=True))
+    rows = run.for_time(1.0, DeviceReading(rates, is_held=True))
     speed = (rows[-1, axis] - rows[-201, axis]) / 0.2
     assert speed == pytest.approx(-0.03, rel=0.02)
     assert np.abs(np.delete(rows[:, :6], axis, axis=1)).max() < 1e-12
@@ -76,7 +76,7 @@ def test_full_deflection_moves_the_stylus_at_the_stated_speed(axis: int) -> None
 def test_full_deflection_turns_the_stylus_about_axes_of_the_base(axis: int) -> None:
     run, rates = Session(turn_speed=0.5), np.zeros(6)
     rates[3 + axis] = 1.0
-    run.for_time(1.2, Reading(rates, is_held=True))
+    run.for_time(1.2, DeviceReading(rates, is_held=True))
     w, x, y, z = run.hand.pose[3:]
     start = Rotation.from_quat(rest_pose()[[4, 5, 6, 3]])
     turned = (Rotation.from_quat([x, y, z, w]) * start.inv()).as_rotvec()
@@ -86,20 +86,20 @@ def test_full_deflection_turns_the_stylus_about_axes_of_the_base(axis: int) -> N
 
 @given(six)
 def test_nothing_moves_unless_the_person_holds_on(rates: Array) -> None:
-    rows = Session().for_time(0.4, Reading(rates))
+    rows = Session().for_time(0.4, DeviceReading(rates))
     assert (rows[:, :6] == 0.0).all()
     assert (rows[:, 6] == 1.0).all()
 
 
 def test_letting_go_presses_the_clutch_within_a_look_and_a_new_grip_does_not_jump() -> None:
-    run, away = Session(), Reading(np.array([1.0, 0, 0, 0, 0, 0]), is_held=True)
+    run, away = Session(), DeviceReading(np.array([1.0, 0, 0, 0, 0, 0]), is_held=True)
     run.for_time(0.5, away)
     assert run.rows[-1, 6] == 0.0
     count = len(run.rows)
     run.for_time(1.0, NOTHING)
     assert run.rows[count + 20 :, 6].min() == 1.0
     there, count = run.rows[-1, :3].copy(), len(run.rows)
-    run.for_time(0.3, Reading(np.zeros(6), is_held=True))
+    run.for_time(0.3, DeviceReading(np.zeros(6), is_held=True))
     np.testing.assert_allclose(run.rows[count:, :3], np.tile(there, (300, 1)), atol=1e-9)
     assert (run.rows[count + 20 :, 6] == 0.0).all()
 
@@ -108,17 +108,17 @@ def test_who_steers_into_the_end_of_the_workspace_leaves_it_at_once() -> None:
     rest = rest_pose()[:3]
     run = Session(room=(rest - 0.01, rest + 0.01), speed=0.1)
     out, back = np.array([1.0, 0, 0, 0, 0, 0]), np.array([-1.0, 0, 0, 0, 0, 0])
-    run.for_time(2.0, Reading(out, is_held=True))
+    run.for_time(2.0, DeviceReading(out, is_held=True))
     assert run.rows[-1, 0] == pytest.approx(0.01, abs=1e-6)
-    run.for_time(0.15, Reading(back, is_held=True))
+    run.for_time(0.15, DeviceReading(back, is_held=True))
     assert run.rows[-1, 0] < 0.002
 
 
 def test_each_press_of_a_button_is_one_press_of_the_hand() -> None:
     run = Session()
     for _ in range(3):
-        run.for_time(0.3, Reading(np.zeros(6), fixture=True))
-        run.for_time(0.3, Reading(np.zeros(6), mode=True))
+        run.for_time(0.3, DeviceReading(np.zeros(6), fixture=True))
+        run.for_time(0.3, DeviceReading(np.zeros(6), mode=True))
     for column in (7, 8):
         assert (np.diff(run.rows[:, column], prepend=0.0) > 0.0).sum() == 3
 
@@ -137,7 +137,7 @@ def test_no_device_is_told_in_one_line_that_lists_what_was_found(name: str) -> N
 
 def closed(run: Session, share: float | None) -> float:
     """How far the hand closes the jaw a tenth of a second after the device said a share."""
-    return run.for_time(0.1, Reading(np.zeros(6), jaw=share))[-1, 12]
+    return run.for_time(0.1, DeviceReading(np.zeros(6), jaw=share))[-1, 12]
 
 
 def test_the_jaw_is_closed_as_far_as_the_device_says_whether_the_stylus_is_held_or_not() -> None:

@@ -17,7 +17,7 @@ from teleop_core.base import build
 from teleop_core.hand.master import hand_mechanics, haptic_master
 from teleop_core.hand.master.device import DeviceParameters
 from teleop_core.hand.operators import OPERATORS, Setting, register_operator
-from teleop_core.hand.operators.behaviour import ButtonParameters, OperatorParameters
+from teleop_core.hand.operators.behaviour import OperatorParameters, PressParameters
 from teleop_core.hand.operators.rest import REST_POSITION, REST_TILT
 from teleop_core.hand.operators.shapes import PHASES
 from teleop_core.kernels import Array, records
@@ -52,7 +52,7 @@ def parameters(
     """Those of the operator and of the device; ``tremor_…`` of the hand are the operator's."""
     own: dict[str, Any] = {k: v for k, v in (hand or {}).items() if k.startswith("tremor")}
     rest = {k: v for k, v in (hand or {}).items() if k not in own}
-    person = replace(operator, seed=seed, patience=0.0, buttons=ButtonParameters(**(buttons or {})), **own)
+    person = replace(operator, seed=seed, patience=0.0, buttons=PressParameters(**(buttons or {})), **own)
     return person, haptic_master.HapticMasterParameters(
         seed=seed, device=DeviceParameters(**(device or {})), hand=hand_mechanics.HandParameters(**rest)
     )

@@ -12,7 +12,7 @@ import yaml
 from teleop_core.base.errors import ParameterError, TeleopError
 from teleop_core.base.plain_yaml import LARGEST_TEXT
 from teleop_core.nodes.files import checked_arguments
-from teleop_core.nodes.launching import COMMON, ONE_ARM, TWO_ARMS, Process, processes
+from teleop_core.nodes.launching import COMMON, ONE_ARM, TWO_ARMS, LaunchedProcess, processes
 from teleop_core.nodes.start import taken_names
 
 LAUNCH = Path(__file__).resolve().parents[2] / "src" / "teleop_core" / "launch"
@@ -24,7 +24,7 @@ def given(own: dict[str, tuple[str, str]] = ONE_ARM, **values: str) -> dict[str,
     return {name: default for name, (default, _) in (COMMON | own).items()} | values
 
 
-def parameters(process: Process) -> dict[str, dict[str, str | float | bool | list[str | float]]]:
+def parameters(process: LaunchedProcess) -> dict[str, dict[str, str | float | bool | list[str | float]]]:
     content = yaml.safe_load(Path(process.parameters).read_text())
     return {name: node["ros__parameters"] for name, node in content.items()}
 

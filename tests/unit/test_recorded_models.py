@@ -13,7 +13,7 @@ from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
 import teleop_core as tc
-from teleop_core.bags.markers import Marker, Shape, marker_message
+from teleop_core.bags.markers import Marker, MarkerShape, marker_message
 from teleop_core.bags.transforms import TransformMessages
 from teleop_core.base import ShapeError, UnknownNameError, values_of
 from teleop_core.graph import TICK_NS
@@ -195,8 +195,8 @@ def test_markers_are_read_as_they_were_drawn() -> None:
     points = np.arange(12.0).reshape(4, 3)
     path, box = read_markers(
         [
-            Marker("path", "slave_base", Shape.LINE_STRIP, points=points),
-            Marker("odd", "left/master_base", Shape.CUBE, scale=(1.0, 2.0, 3.0), is_shown=False),
+            Marker("path", "slave_base", MarkerShape.LINE_STRIP, points=points),
+            Marker("odd", "left/master_base", MarkerShape.CUBE, scale=(1.0, 2.0, 3.0), is_shown=False),
         ]
     )
     assert [(p.x, p.y, p.z) for p in path.points] == [tuple(row) for row in points]
@@ -211,11 +211,11 @@ def test_a_fixture_is_drawn_where_the_state_says_and_red_while_it_is_touched() -
     touched = arm.fixture(STATE, {"fixture": "sphere", "fixture.radius": "0.015"}, force=1.0)
     assert free.frame == "left/slave_base"
     assert (free.pose[:3].tolist(), free.scale) == ([0.1, 0.2, 0.3], (0.02, 0.03, 0.04))
-    assert (free.shape, touched.shape) == (Shape.CUBE, Shape.SPHERE)
+    assert (free.shape, touched.shape) == (MarkerShape.CUBE, MarkerShape.SPHERE)
     assert touched.color[0] > touched.color[2]
     assert free.color[0] < free.color[2]
     assert not arm.fixture({}, {}).is_shown
-    assert arm.fixture(STATE, {"fixture": "of another program"}).shape == Shape.CUBE
+    assert arm.fixture(STATE, {"fixture": "of another program"}).shape == MarkerShape.CUBE
 
 
 @pytest.mark.parametrize("kind", DRAWN)
@@ -224,7 +224,7 @@ def test_other_fixtures_are_drawn_along_their_edges_around_the_slave(kind: str) 
     values = {f"fixture.{n}": repr(v) for n, v in values_of(part.parameters()).items()}
     axes = axis_map("axes", ("+y", "-x", "+z"))
     marker = ArmMarkers("left", axes).fixture(STATE | {"gain": 0.5}, {"fixture": kind} | values)
-    assert (marker.shape, marker.pose[:3].tolist()) == (Shape.LINE_LIST, [0.1, 0.2, 0.3])
+    assert (marker.shape, marker.pose[:3].tolist()) == (MarkerShape.LINE_LIST, [0.1, 0.2, 0.3])
     outline = part.outline(part.parameters())
     outline = outline[np.isfinite(outline).all(axis=1)]
     places = 2.0 * marker.points @ axes  # back to the master's axes and the hand's size

@@ -98,7 +98,7 @@ def test_a_result_that_is_cut_off_counts_as_missing(found: Found, tmp_path: Path
         assert study().explain(store).why == {"missing": 1}
     finally:
         file.write_text(text)
-    assert point.Result.from_json(text).to_json() == text
+    assert point.PointResult.from_json(text).to_json() == text
 
 
 def test_a_session_that_fails_is_a_point_with_its_error(own_parts: None, tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ import pytest
 from teleop_lab import Study, read_study
 from teleop_lab.studies.answers import UNTOLD, effect_told, parameters_of, score_of
 from teleop_lab.studies.dataset import dataset_of, swept_coordinates
-from teleop_lab.studies.point import Key, Result
+from teleop_lab.studies.point import PointKey, PointResult
 from teleop_lab.studies.printed import Printed
 from teleop_lab.studies.study_page import study_page
 from teleop_lab.studies.summary import Mean, change_of, interplay, mean_of
@@ -122,7 +122,7 @@ def test_people_stand_beside_the_sessions_and_are_counted() -> None:
     made = Study("point", {"display.latency": (0.0, 0.1)}, (1, 2), (TIME,))
     values = {TIME: np.array([[1.0, 0.5, 1.5], [9.0, 8.0, 10.0]])}
     with_people = Study("point", made.swept, made.seeds, made.metrics, printed=Printed("people", values))
-    results = [Result(point.name, Key("", ""), {TIME: 1.0}, "", 1.0) for point in made.points()]
+    results = [PointResult(point.name, PointKey("", ""), {TIME: 1.0}, "", 1.0) for point in made.points()]
     found = dataset_of({**swept_coordinates(made.swept), "seed": [1, 2]}, made.metrics, results, {})
     assert "1 of 2 conditions" in study_page(with_people, found, "late")
     assert "of 2 conditions" not in study_page(made, found, "late")

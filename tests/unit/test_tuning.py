@@ -9,7 +9,7 @@ import pytest
 
 import teleop_core as tc
 from teleop_lab import Tuning, read_tuning
-from teleop_lab.studies import Range, Trial, Tuned
+from teleop_lab.studies import SearchRange, Trial, Tuned
 from teleop_lab.studies.summary import least_difference
 from teleop_lab.studies.tuning_page import tuning_page
 
@@ -19,7 +19,9 @@ WITHOUT_EYES = {"teleop.duration": 0.5, "teleop.stages": ("display",)}
 
 
 def tuning(**changes: Any) -> Tuning:
-    whole = Tuning("coarse_box", {"coarse_gain": Range(0.2, 1.0)}, (1,), METRIC, settings={"teleop.duration": 0.5})
+    whole = Tuning(
+        "coarse_box", {"coarse_gain": SearchRange(0.2, 1.0)}, (1,), METRIC, settings={"teleop.duration": 0.5}
+    )
     return replace(whole, **changes)
 
 
@@ -113,7 +115,7 @@ def test_one_seed_tells_no_values_apart_and_says_so() -> None:
 
 
 def test_a_parameter_that_does_nothing_has_the_whole_range_for_its_best_value() -> None:
-    tuned = tuning(searched={"display.latency": Range(0.0, 0.5)}, seeds=(1, 2), settings=WITHOUT_EYES).run(
+    tuned = tuning(searched={"display.latency": SearchRange(0.0, 0.5)}, seeds=(1, 2), settings=WITHOUT_EYES).run(
         trials=3, jobs=1
     )
     assert len(tuned.alike) == 3
@@ -127,7 +129,7 @@ def test_what_a_seed_adds_to_all_scores_does_not_count(seeds: int) -> None:
 
 
 def test_choices_and_whole_numbers_are_kept_as_they_are() -> None:
-    searched = {"controller": ["pid", "disturbance_observer"], "integration_steps": Range(1, 4)}
+    searched = {"controller": ["pid", "disturbance_observer"], "integration_steps": SearchRange(1, 4)}
     tuned = tuning(searched=searched).run(trials=4, jobs=1)
     for trial in tuned.trials:
         assert trial.values["controller"] in searched["controller"]

@@ -95,7 +95,7 @@ class Pilot:
 
 
 @dataclass(frozen=True, eq=False)
-class Network:
+class NeuralNetwork:
     """A small policy: a network of one hidden layer that is trained on demonstrations.
 
     Attributes:
@@ -116,7 +116,7 @@ class Network:
         return np.asarray((np.tanh((inputs - self.center) / self.spread @ W + b) @ V + c) * self.scale)
 
 
-def trained(inputs: Array, outputs: Array, *, hidden: int = 32, rounds: int = 2000, seed: int = 0) -> Network:
+def trained(inputs: Array, outputs: Array, *, hidden: int = 32, rounds: int = 2000, seed: int = 0) -> NeuralNetwork:
     """Network that imitates demonstrations, by Adam on the squared error (Kingma and Ba 2015, algorithm 1).
 
     Args:
@@ -141,4 +141,4 @@ def trained(inputs: Array, outputs: Array, *, hidden: int = 32, rounds: int = 20
             first[k] += 0.1 * (slope - first[k])
             second[k] += 0.001 * (slope * slope - second[k])
             P[k] -= 0.01 * (first[k] / (1.0 - 0.9**step)) / (np.sqrt(second[k] / (1.0 - 0.999**step)) + 1e-8)
-    return Network((P[0], P[1], P[2], P[3]), center, spread, scale)
+    return NeuralNetwork((P[0], P[1], P[2], P[3]), center, spread, scale)

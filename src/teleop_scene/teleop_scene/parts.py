@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from teleop_core.base import NoParameters
 from teleop_core.graph import DT, Beside, RunningStage, Stage, topics
 from teleop_core.robots.robot import Robot
-from teleop_core.slave.arm import SimulatedArm
+from teleop_core.slave.arm import ArmParts
 from teleop_core.slave.plants import PLANTS, Physics, Plant
 from teleop_scene.parameters import SceneParameters, View
 
@@ -52,7 +52,7 @@ def _physics(_parameters: NoParameters, robot: Robot) -> Physics:
     return found
 
 
-def _mover(_parameters: NoParameters, robot: Robot, arm: SimulatedArm, row: Any, dt: float) -> "Mover":
+def _mover(_parameters: NoParameters, robot: Robot, arm: ArmParts, row: Any, dt: float) -> "Mover":
     from teleop_scene.plant import mover
 
     return mover(robot, arm, row, dt)
@@ -71,9 +71,9 @@ def cameras_beside(p: SceneParameters) -> Beside | None:
 
 
 def _stage(parameters: SceneParameters, dt: float = DT) -> RunningStage:
-    from teleop_scene.world import World
+    from teleop_scene.bodies import SceneBodies
 
-    return World(SCENE_STAGE, parameters, dt)
+    return SceneBodies(SCENE_STAGE, parameters, dt)
 
 
 SCENE_STAGE = Stage(

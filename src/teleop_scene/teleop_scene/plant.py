@@ -13,7 +13,7 @@ from teleop_core.graph import Row, topics
 from teleop_core.kernels import Addressed, Array, Fields, addressed, inner, kernel, record
 from teleop_core.kernels.fields import Integers
 from teleop_core.robots.robot import Robot
-from teleop_core.slave.arm import SimulatedArm
+from teleop_core.slave.arm import ArmParts
 from teleop_scene import actuators
 from teleop_scene.arm import SceneRobot
 from teleop_scene.chain import ancestors, is_puppet
@@ -42,7 +42,7 @@ def see(
     forces: Array,
     center: Array,
     R: Array,
-    arm: SimulatedArm,
+    arm: ArmParts,
     row: Row,
 ) -> None:
     """Write an arm's joints, and the force on its tip, at the beginning of a tick.
@@ -77,7 +77,7 @@ def see(
 
 
 @inner
-def _feel(bodies: Integers, forces: Array, center: Array, R: Array, arm: SimulatedArm, row: Row) -> None:
+def _feel(bodies: Integers, forces: Array, center: Array, R: Array, arm: ArmParts, row: Row) -> None:
     """Write the force on the tip in axes of the base, and its torque about the tip."""
     F, M, tip = np.zeros(3), np.zeros(3), np.zeros(3)
     for k in range(bodies.shape[0]):
@@ -107,7 +107,7 @@ def move(
     control: Array,
     efforts: Array,
     friction: tuple[Array, Array],
-    arm: SimulatedArm,
+    arm: ArmParts,
     row: Row,
 ) -> None:
     """Give the scene what moves an arm in the coming tick.
@@ -147,7 +147,7 @@ class Mover:
     see: Addressed
     move: Addressed
 
-    def __init__(self, robot: SceneRobot, arm: SimulatedArm, row: Any, dt: float) -> None:
+    def __init__(self, robot: SceneRobot, arm: ArmParts, row: Any, dt: float) -> None:
         self.scene = scene = shared(robot.file, dt, robot.chain.tip)
         self._robot, self._arm, model = robot, arm, scene.model
         joints = robot.chain.joints
@@ -209,7 +209,7 @@ class Mover:
         return [text for text in (self.scene.problem(), self._slowness) if text]
 
 
-def mover(robot: Robot, arm: SimulatedArm, row: Any, dt: float) -> Mover:
+def mover(robot: Robot, arm: ArmParts, row: Any, dt: float) -> Mover:
     """Mover of an arm in a scene.
 
     Raises:

@@ -22,8 +22,8 @@ from teleop_core.coupling.mapping.gains import FixtureParameters
 from teleop_core.coupling.mapping.jaw_command import JawCommandParameters
 from teleop_core.graph.graph import Delay
 from teleop_core.hand.master.master_bridge import POSE_MESSAGES, MasterBridgeParameters
-from teleop_core.hand.operators.behaviour import ButtonParameters as HandButtons
 from teleop_core.hand.operators.behaviour import OperatorParameters
+from teleop_core.hand.operators.behaviour import PressParameters as HandButtons
 from teleop_core.hand.operators.human import HumanParameters
 from teleop_core.hand.operators.remote import RemoteHand
 from teleop_core.hand.operators.tour import TourParameters
@@ -55,7 +55,7 @@ from teleop_drill import drill
 from teleop_lab import Study, Tuning
 from teleop_lab.calibration import Measured, appendix_e, simulate
 from teleop_lab.experiments import Comparison, Tolerance, absolute, factor, percent
-from teleop_lab.studies import Range
+from teleop_lab.studies import SearchRange
 from teleop_lab.studies.printed import read_printed
 from teleop_machines import mma_balance, mma_models, mobility
 from teleop_machines.drives import electric_cylinders
@@ -78,7 +78,9 @@ def study(changes: Any) -> object:
 
 
 def tuning(changes: Any) -> object:
-    return replace(Tuning("coarse_box", {"coarse_gain": Range(0.2, 1.0)}, (1,), "position_error_mm.rms"), **changes)
+    return replace(
+        Tuning("coarse_box", {"coarse_gain": SearchRange(0.2, 1.0)}, (1,), "position_error_mm.rms"), **changes
+    )
 
 
 def printed(content: Any) -> object:
@@ -260,10 +262,10 @@ CASES = [
         ({"settings": {"world": "sphere", "world.place": (9.0, 0.0, 0.0)}}, "within reach .* no nearer than 8"))),
     *((partial(tuning, changes), words) for changes, words in (
         ({"searched": {}}, "at least one parameter"), ({"metric": "task.tim"}, "task.time_s"),
-        ({"searched": {"coarse_gian": Range(0.1, 1.0)}}, "coarse_gain"),
-        ({"searched": {"coarse_gain": Range(1.0, 0.1)}}, "low below high"),
-        ({"searched": {"coarse_gain": Range(0.0, 1.0, is_log=True)}}, "above 0 with log"),
-        ({"searched": {"coarse_gain": Range(0.1, 1000.0)}}, "10"))),
+        ({"searched": {"coarse_gian": SearchRange(0.1, 1.0)}}, "coarse_gain"),
+        ({"searched": {"coarse_gain": SearchRange(1.0, 0.1)}}, "low below high"),
+        ({"searched": {"coarse_gain": SearchRange(0.0, 1.0, is_log=True)}}, "above 0 with log"),
+        ({"searched": {"coarse_gain": SearchRange(0.1, 1000.0)}}, "10"))),
     *((partial(printed, content), words) for content, words in (
         ({"source": "people", "task.time_s": [1.0, 2.0]}, "two or more"),
         ({"people": 5, "task.time_s": [1.0, 2.0]}, "source"),

@@ -6,7 +6,7 @@ from teleop_console.report.pages import Card, Cell, Section, Sessions, Table, pa
 from teleop_core.evaluation.published import ANGLE_FACTOR, POSITION_SHARE, SOURCE, published_for
 from teleop_core.evaluation.rows import is_compared, number, side_by_side
 from teleop_core.evaluation.score import Score
-from teleop_core.evaluation.scoring import Study
+from teleop_core.evaluation.scoring import ReportedScore
 from teleop_core.evaluation.traces import spacing_s
 from teleop_core.evaluation.verdict import SHARE, percent
 
@@ -27,7 +27,7 @@ _OFTEN_NOTHING = {"latency_ms.total.p99", "force_n.max", "fixture.penetration_ma
 _MARKS = {True: "value met", False: "value missed", None: "value plain"}
 
 
-def report_page(studies: Sequence[Study]) -> str:
+def report_page(studies: Sequence[ReportedScore]) -> str:
     """HTML page with the summary of all recordings and the plots of each.
 
     The page works offline, because it contains plotly.js. All plots of a recording against time show the same interval,
@@ -54,7 +54,7 @@ def _known(score: Score) -> Iterator[tuple[str, str, str]]:
             yield number(value), unit, text
 
 
-def _section(i: int, study: Study) -> Section:
+def _section(i: int, study: ReportedScore) -> Section:
     session = study.score.session
     samples = max((topic.count for topic in study.score.topics.values()), default=0)
     kept_s = spacing_s(samples, session.duration_s)

@@ -22,7 +22,7 @@ Color = tuple[float, float, float, float]
 _NONE = np.zeros((0, 3))
 
 
-class Shape(IntEnum):
+class MarkerShape(IntEnum):
     """Values of the field ``type`` of visualization_msgs/Marker."""
 
     ARROW = 0
@@ -50,7 +50,7 @@ class Marker:
 
     name: str
     frame: str
-    shape: Shape
+    shape: MarkerShape
     pose: Array = field(default_factory=lambda: np.array([0.0, 0, 0, 1, 0, 0, 0]))
     scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
     color: Color = (1.0, 1.0, 1.0, 1.0)

@@ -37,7 +37,7 @@ class Records(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Place:
+class FilePart:
     """Part of a file that contains messages: a chunk at ``offset``, or records outside of chunks."""
 
     offset: int
@@ -54,7 +54,7 @@ class Contents:
     schemas: dict[int, Schema] = field(default_factory=dict)
     channels: dict[int, Channel] = field(default_factory=dict)
     metadata: list[Metadata] = field(default_factory=list)
-    places: list[Place] = field(default_factory=list)
+    places: list[FilePart] = field(default_factory=list)
     counts: Counter[int] = field(default_factory=Counter)
     end: int = 0
 
@@ -146,7 +146,7 @@ class McapSource:
 
     # -- messages --------------------------------------------------------------------------------
 
-    def records(self, places: list[Place], window: int = _WINDOW) -> Iterator[Records]:
+    def records(self, places: list[FilePart], window: int = _WINDOW) -> Iterator[Records]:
         """Messages of each part of the file in turn; another thread decompresses the next parts meanwhile.
 
         Args:
@@ -167,7 +167,7 @@ class McapSource:
                 else:
                     yield _table(data, walk.walk(data, 0, len(data))[0])
 
-    def _load(self, file: BinaryIO, place: Place) -> layouts.Bytes:
+    def _load(self, file: BinaryIO, place: FilePart) -> layouts.Bytes:
         if place.end:
             return self.mapped()
         with damage_told(self.path, _UNREAD.format(f"the chunk at byte {place.offset}")):
@@ -193,10 +193,10 @@ def _stream(data: layouts.Bytes, begin: int, size: int) -> ReadDataStream:
     return ReadDataStream(BytesIO(data[begin : begin + size].tobytes()))
 
 
-def _place(index: ChunkIndex) -> Place:
+def _place(index: ChunkIndex) -> FilePart:
     """Place of a chunk, from its entry in the file's index."""
     channels = frozenset(index.message_index_offsets) or None
-    return Place(index.chunk_start_offset, index.message_start_time, index.message_end_time, channels)
+    return FilePart(index.chunk_start_offset, index.message_start_time, index.message_end_time, channels)
 
 
 def _chunk_at(file: BinaryIO, offset: int) -> Chunk:
@@ -223,7 +223,7 @@ def _table(data: layouts.Bytes, rows: walk.Rows) -> Records:
     return Records(data, rows[:, walk.CHANNEL], rows[:, walk.LOG], rows[:, walk.BEGIN], rows[:, walk.SIZE])
 
 
-def _windows(data: layouts.Bytes, place: Place, window: int) -> Iterator[Records]:
+def _windows(data: layouts.Bytes, place: FilePart, window: int) -> Iterator[Records]:
     """Messages outside of chunks, as tables of about ``window`` bytes of the file."""
     at = place.offset
     while at < place.end:
@@ -259,10 +259,10 @@ def _note_chunk(found: Contents, data: layouts.Bytes, offset: int) -> None:
     if len(messages):
         logs = messages[:, walk.LOG]
         found.counts.update(messages[:, walk.CHANNEL].tolist())
-        found.places.append(Place(offset, int(logs.min()), int(logs.max())))
+        found.places.append(FilePart(offset, int(logs.min()), int(logs.max())))
 
 
-def _loose(found: Contents, rows: walk.Rows) -> list[Place]:
+def _loose(found: Contents, rows: walk.Rows) -> list[FilePart]:
     """Part of the file that contains messages outside of chunks; an empty list if there are none."""
     loose = rows[rows[:, walk.OPCODE] == Opcode.MESSAGE]
     if not len(loose):
@@ -271,4 +271,4 @@ def _loose(found: Contents, rows: walk.Rows) -> list[Place]:
     logs, last = loose[:, walk.LOG], loose[-1]
     begin = int(loose[0, walk.BEGIN]) - 31
     end = int(last[walk.BEGIN] + last[walk.SIZE])
-    return [Place(begin, int(logs.min()), int(logs.max()), None, end)]
+    return [FilePart(begin, int(logs.min()), int(logs.max()), None, end)]

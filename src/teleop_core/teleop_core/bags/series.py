@@ -60,7 +60,7 @@ def kind_of(name: str, ros_type: str) -> Kind | None:
     return next((kind for kind in reversed(Kind) if kind.ros_type == ros_type), None)
 
 
-class UnreadableError(ValueError):
+class UnreadableMessageError(ValueError):
     """Bytes that are not a valid message of their type."""
 
 
@@ -118,7 +118,7 @@ class Column:
         for i in np.argsort(sizes != usual, kind="stable").tolist():
             try:
                 self._learn(bytes(data[begins[i] : begins[i] + sizes[i]]))
-            except UnreadableError:
+            except UnreadableMessageError:
                 continue
             self._is_new = False
             return
@@ -173,7 +173,7 @@ class Column:
         try:
             return ros_types.deserialise(data, self.kind.ros_type)
         except ValueError as error:
-            raise UnreadableError(str(error)) from error
+            raise UnreadableMessageError(str(error)) from error
 
 
 def join(parts: list[Series], column: Column) -> Series:

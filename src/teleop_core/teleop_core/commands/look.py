@@ -12,12 +12,12 @@ from teleop_core.commands.operate import chosen_domains
 from teleop_core.commands.options import Domain, ros_module
 
 if TYPE_CHECKING:
-    from teleop_core.nodes.looking import Look, Rate
+    from teleop_core.nodes.looking import LookingNode, Rate
 
 _PART = 1000  # largest number of array elements that are printed
 
 
-def _look(domain: int | None) -> "Look":
+def _look(domain: int | None) -> "LookingNode":
     from teleop_core.nodes.children import environment
 
     module = ros_module("looking")
@@ -25,7 +25,7 @@ def _look(domain: int | None) -> "Look":
     found = chosen_domains(domain)
     if len(found) > 1:
         raise ParameterError("--domain", None, f"one of {', '.join(map(str, found))}: several sessions run here")
-    look: Look = module.Look(found[0])
+    look: LookingNode = module.Look(found[0])
     return look
 
 

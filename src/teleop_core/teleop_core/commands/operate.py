@@ -9,7 +9,7 @@ from teleop_core.commands.options import Domain, ros_module
 from teleop_core.middleware.domains import domain_of_environment
 
 if TYPE_CHECKING:
-    from teleop_core.nodes.remote_control import ArmState, RemoteControl
+    from teleop_core.nodes.remote_control import RemoteControl, ReportedArm
 
 
 def chosen_domains(domain: int | None) -> tuple[int, ...]:
@@ -71,7 +71,7 @@ def stop(*, domain: Domain = None) -> int:
     return 1 if failed else 0
 
 
-def _stopped(arm: "ArmState") -> str:
+def _stopped(arm: "ReportedArm") -> str:
     values = arm.values
     return (
         f"stopped, confirmed after {1000.0 * arm.stopped_after:.0f} ms; at rest "

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from teleop_core.evaluation.windows import *  # noqa: F403
 else:  # imported when they are first used
     _NAMES = {
-        "accumulators": ("Delay", "Distribution", "Integers", "Moments", "Spread"),
+        "accumulators": ("DelaySpread", "Distribution", "Integers", "Moments", "Spread"),
         "context": ("Context",),
         "figure": ("COMMAND", "DARK", "FIRST", "FIXTURE", "Figure", "MEASURED", "SECOND", "THIRD", "axis_suffix",
             "line", "time_axis"),

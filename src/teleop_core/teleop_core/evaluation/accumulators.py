@@ -29,7 +29,7 @@ class Spread:
 
 
 @dataclass(frozen=True)
-class Delay:
+class DelaySpread:
     """Median, 99th percentile and maximum of a delay, [ms]; None without samples."""
 
     median: float | None
@@ -104,10 +104,10 @@ class Distribution:
         rank = max(1, math.ceil(share * self.count))
         return int(self.values_us[np.searchsorted(np.cumsum(self.counts), rank)])
 
-    def delay(self) -> Delay:
+    def delay(self) -> DelaySpread:
         """Median, 99th percentile and maximum of the durations added so far, [ms]."""
         median, p99, largest = (self.quantile_us(share) for share in (0.5, 0.99, 1.0))
-        return Delay(_ms(median), _ms(p99), _ms(largest))
+        return DelaySpread(_ms(median), _ms(p99), _ms(largest))
 
     def histogram(self, width_us: int) -> tuple[Array, Array]:
         """Share of the durations per bin, for drawing.

@@ -8,7 +8,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from teleop_core.base.texts import printable
-from teleop_core.evaluation.rows import MISSING, Line, side_by_side
+from teleop_core.evaluation.rows import MISSING, TableLine, side_by_side
 from teleop_core.evaluation.score import Score
 from teleop_core.evaluation.score_table import heading
 
@@ -38,7 +38,7 @@ def _told(first: str, other: str) -> str:
     return other if change is None or not math.isfinite(change) else f"{other} ({change:+.0%})"
 
 
-def _size(line: Line) -> float:
+def _size(line: TableLine) -> float:
     """Largest change of a line; words that differ come first, then values that only some scores have."""
     first, *others = (row.value for row in line.rows)
     changes = [_change(first, other) for other in others if other != first]

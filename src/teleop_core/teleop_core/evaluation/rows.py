@@ -80,7 +80,7 @@ _NOTHING = {MISSING, "0/0/0", "0, 0", "0/0"}
 """Texts of values without information."""
 
 
-class Line(NamedTuple):
+class TableLine(NamedTuple):
     """One line of a table: group, label and unit, and one row per score."""
 
     group: str
@@ -89,17 +89,19 @@ class Line(NamedTuple):
     rows: tuple[TableRow, ...]
 
 
-def side_by_side(tables: Sequence[Sequence[TableRow]]) -> list[Line]:
+def side_by_side(tables: Sequence[Sequence[TableRow]]) -> list[TableLine]:
     """Lines of a table that shows the rows of several scores side by side; a dash means that a score lacks the row.
 
     A line is left out if it shows only dashes, or only delays of zero, as in virtual time.
     """
     found = [{(row.group, row.label, row.unit): row for row in rows} for rows in tables]
     places = dict.fromkeys(place for rows in found for place in rows)
-    lines = [Line(*place, tuple(rows.get(place) or TableRow(*place, MISSING) for rows in found)) for place in places]
+    lines = [
+        TableLine(*place, tuple(rows.get(place) or TableRow(*place, MISSING) for rows in found)) for place in places
+    ]
     return [line for line in lines if any(row.value not in _NOTHING for row in line.rows)]
 
 
-def is_compared(lines: Sequence[Line]) -> bool:
+def is_compared(lines: Sequence[TableLine]) -> bool:
     """Whether any line shows a published value."""
     return any(row.published for line in lines for row in line.rows)

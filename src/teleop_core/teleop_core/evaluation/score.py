@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Generic, NoReturn, TypeVar
 
 from teleop_core.base.errors import EvaluationError, UnknownNameError
-from teleop_core.evaluation.accumulators import Delay, Spread
+from teleop_core.evaluation.accumulators import DelaySpread, Spread
 from teleop_core.evaluation.html_table import compact_table
 from teleop_core.evaluation.metric import Key
 from teleop_core.evaluation.metrics.counts import Counts, Samples, Ticks, TopicScore
@@ -267,7 +267,7 @@ class Score:
     """How far hand and slave left the virtual fixture."""
     force_n = _Found(Spread)
     """Magnitude of the force on the hand, [N]."""
-    latency_ms = _Found[dict[str, Delay]](dict)
+    latency_ms = _Found[dict[str, DelaySpread]](dict)
     """Delay of each stage and of the whole chain, [ms]."""
     ticks = _Found(Ticks)
     """Control ticks of the slave."""

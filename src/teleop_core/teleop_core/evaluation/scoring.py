@@ -39,7 +39,7 @@ REQUIRED = (SLAVE_MEASURED_CP, SLAVE_SETPOINT_CP, SLAVE_SERVO_CP)
 """Topics that every score requires. Values that need other topics are None if those topics are missing."""
 
 
-class Study(NamedTuple):
+class ReportedScore(NamedTuple):
     """A score, the metrics that make the plots of a page, and the intervals in which the slave was limited."""
 
     score: Score
@@ -134,7 +134,7 @@ def _makers(keys: Iterable[str]) -> list[type[Metric]]:
     return [found for found in map(METRICS.find, METRICS) if found.place() in places]
 
 
-def study(bag: Bag, arm: str = "", further: Sequence[type[Metric]] = (), span: Seconds | None = None) -> Study:
+def study(bag: Bag, arm: str = "", further: Sequence[type[Metric]] = (), span: Seconds | None = None) -> ReportedScore:
     """Score of one arm with its metrics. Raises the same errors as :func:`evaluate`."""
     makers = all_metrics(further)
     view = of_arm(bag, arm)
@@ -151,7 +151,7 @@ def study(bag: Bag, arm: str = "", further: Sequence[type[Metric]] = (), span: S
             f"{bag.path}: no {SLAVE_MEASURED_CP.name}{whose} has a valid "
             f"{SLAVE_SETPOINT_CP.name} of the same tick; they must be recorded together"
         )
-    return Study(score, tuple(metrics), bands_of(context))
+    return ReportedScore(score, tuple(metrics), bands_of(context))
 
 
 def _insist_on_a_slave(bag: Bag) -> None:
@@ -168,7 +168,7 @@ def _insist_on_a_slave(bag: Bag) -> None:
     bag.require(REQUIRED)
 
 
-def studies(bag: Bag, further: Sequence[type[Metric]] = (), span: Seconds | None = None) -> list[Study]:
+def studies(bag: Bag, further: Sequence[type[Metric]] = (), span: Seconds | None = None) -> list[ReportedScore]:
     """Scores of all arms with their metrics, the default arm first; see :func:`evaluate`."""
     return [study(bag, arm, further, span) for arm in arm_names(bag)]
 

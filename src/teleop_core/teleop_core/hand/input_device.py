@@ -7,7 +7,7 @@ import numpy as np
 from teleop_core.kernels.geometry import Array
 
 
-class Reading(NamedTuple):
+class DeviceReading(NamedTuple):
     """Present reading of a device.
 
     Attributes:
@@ -28,7 +28,7 @@ class Reading(NamedTuple):
 
 UNHELD = "nobody holds the stylus"
 """End of a node's concern while no person moves the stylus; the console shows such a concern as no warning."""
-NOTHING = Reading(np.zeros(6))
+NOTHING = DeviceReading(np.zeros(6))
 """Reading of an untouched device."""
 
 
@@ -41,7 +41,7 @@ class Device(Protocol):
 
     name: str
 
-    def read(self) -> Reading:
+    def read(self) -> DeviceReading:
         """Return the present reading, without waiting.
 
         Raises:

@@ -42,7 +42,7 @@ _LATCHED = Qos(depth=10, is_latched=True)
 """QoS of states: a late subscriber with transient-local durability receives the last value."""
 
 
-class OperatingState:
+class OperatingStateTopics:
     """Topics of the operating state of one arm, served by the executor.
 
     The node's loop calls :meth:`note` and never publishes these topics itself, so that no slow reader blocks the loop.

@@ -17,7 +17,7 @@ from teleop_core.base.errors import TeleopError
 from teleop_core.graph.operation import State
 from teleop_core.graph.topics import SLAVE_MEASURED_CF, SLAVE_MEASURED_CP, SLAVE_SERVO_CP, SLAVE_SERVO_JP, Kind, Topic
 from teleop_core.kernels.geometry import Array, framed_wrenches, pose_from_transform, transform_from_pose
-from teleop_core.nodes.crtk import SINGLE, STREAMED, Condition, OperatingState, Refusals, is_installed
+from teleop_core.nodes.crtk import SINGLE, STREAMED, Condition, OperatingStateTopics, Refusals, is_installed
 from teleop_core.nodes.outside import OutsideCommands
 from teleop_core.nodes.sender import SECOND_NS
 from teleop_core.nodes.streams import message_type, profile
@@ -54,9 +54,11 @@ class CrtkSlave:
         self._names = stage.robot.joint_names
         self._refusals, self._source = Refusals(node), ""
         self._operation = stage.signals["slave_operation"]
-        self._state: OperatingState | None = None
+        self._state: OperatingStateTopics | None = None
         if is_installed():
-            self._state = OperatingState(node, "slave", stage.request, self._condition, self._motion.refusal_of_age)
+            self._state = OperatingStateTopics(
+                node, "slave", stage.request, self._condition, self._motion.refusal_of_age
+            )
         else:
             node.ros.get_logger().info("crtk_msgs is not installed: no slave/operating_state")
         self._subscriptions = [self._listen(*entry) for entry in self._commands()]
@@ -64,7 +66,7 @@ class CrtkSlave:
         led = {SLAVE_SERVO_JP: streams["interpolate_jp"], SLAVE_SERVO_CP: streams["interpolate_cp"]}
         takes = {topic: partial(self._take, topic.name.removeprefix("slave/"), led[topic]) for topic in led}
         self._outside = OutsideCommands(node, takes, self._refusals)
-        self._measured = Measured(node, stage)
+        self._measured = MeasuredTopics(node, stage)
 
     def note(self, stamp_ns: int) -> None:
         """Let the executor send a changed operating state with a stamp [ns]; called from the node's loop."""
@@ -185,7 +187,7 @@ def _twist(message: Any) -> list[float]:
     return [v.x, v.y, v.z, w.x, w.y, w.z]
 
 
-class Measured:
+class MeasuredTopics:
     """Measurements in addition to the streams, sent a hundred times a second while there is a reader.
 
     Args:

@@ -6,7 +6,7 @@ from teleop_core.graph.operation import State
 from teleop_core.graph.topics import HAND_SERVO_CP, MASTER_CONTACT, MASTER_SERVO_CF, OPERATION, SLAVE_OPERATION, Topic
 from teleop_core.hand.input_device import UNHELD
 from teleop_core.hand.master.haptic_master import HapticMasterParameters
-from teleop_core.nodes.crtk import Condition, OperatingState, is_installed
+from teleop_core.nodes.crtk import Condition, OperatingStateTopics, is_installed
 from teleop_core.nodes.operation import StopInput
 from teleop_core.nodes.ticking import TickingNode
 from teleop_core.slave.operation.states import TABLE, Answer, Event, answer_text, command_event
@@ -25,9 +25,9 @@ class CrtkMaster:
 
     def __init__(self, node: Any) -> None:
         self._node, self._state, self._is_stopped = node, State.ENABLED, False
-        self._topics: OperatingState | None = None
+        self._topics: OperatingStateTopics | None = None
         if is_installed():
-            self._topics = OperatingState(node, "master", self.request, self._condition)
+            self._topics = OperatingStateTopics(node, "master", self.request, self._condition)
 
     @property
     def is_enabled(self) -> bool:

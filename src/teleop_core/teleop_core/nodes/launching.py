@@ -46,7 +46,7 @@ _RESPAWN_DELAY = 2.0
 
 
 @dataclass(frozen=True)
-class Process:
+class LaunchedProcess:
     """One process to start.
 
     Attributes:
@@ -68,7 +68,7 @@ class Process:
     respawns: bool = False
 
 
-def processes(given: Mapping[str, str], namespace: str = "") -> list[Process]:
+def processes(given: Mapping[str, str], namespace: str = "") -> list[LaunchedProcess]:
     """Processes of a session. The recorder is the first and masters are the last, so that no message is missed.
 
     Args:
@@ -98,7 +98,7 @@ def processes(given: Mapping[str, str], namespace: str = "") -> list[Process]:
         respawns = _truth("respawn", given["respawn"]) and not stages & {*_ONCE}
         name, executable = (stage, "stage") if len(nodes) == 1 else ("", SESSION)
         words = (stage,) if len(nodes) == 1 else nodes
-        found.append(Process(executable, words, name, f"/{below}", file, level, respawns))
+        found.append(LaunchedProcess(executable, words, name, f"/{below}", file, level, respawns))
     return found
 
 
@@ -140,7 +140,7 @@ def describe(own: Mapping[str, tuple[str, str]]) -> "LaunchDescription":
     return LaunchDescription([*declared, OpaqueFunction(function=nodes)])
 
 
-def _action(node: Any, process: Process) -> Any:
+def _action(node: Any, process: LaunchedProcess) -> Any:
     return node(
         package="teleop_core",
         executable=process.executable,

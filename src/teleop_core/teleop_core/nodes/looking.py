@@ -41,7 +41,7 @@ class Rate(NamedTuple):
     longest: float
 
 
-class Look(Guest):
+class LookingNode(Guest):
     """Node that looks at the other nodes of a ROS domain, and sets their parameters.
 
     Args:

@@ -192,7 +192,7 @@ class StopInput:
         return there
 
 
-class Commanded(Protocol):
+class CommandReceiver(Protocol):
     """Receiver of the stop and of named commands; each command is answered with a text."""
 
     def request(self, event: str) -> tuple[Answer, str]:
@@ -215,7 +215,9 @@ class CommandServices:
         holders: Returns the buttons that are pressed or missing now.
     """
 
-    def __init__(self, node: Any, arm: Commanded, stop: StopInput, holders: Callable[[], tuple[bytes, ...]]) -> None:
+    def __init__(
+        self, node: Any, arm: CommandReceiver, stop: StopInput, holders: Callable[[], tuple[bytes, ...]]
+    ) -> None:
         self._node, self._arm, self._stop, self._holders = node, arm, stop, holders
         calls = {name: partial(self._command, name) for name in COMMANDS}
         self._own = [

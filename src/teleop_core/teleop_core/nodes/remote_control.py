@@ -23,7 +23,7 @@ _PERIOD = 0.01
 
 
 @dataclass
-class ArmState:
+class ReportedArm:
     """Last reported state of an arm.
 
     Attributes:
@@ -54,7 +54,7 @@ class RemoteControl(Guest):
     def __init__(self, domain: int, patience: float = 3.0, world: World = ROS) -> None:
         super().__init__("teleop_remote_control", domain, world)
         self.domain, self._patience = domain, patience
-        self.arms: dict[str, ArmState] = {}
+        self.arms: dict[str, ReportedArm] = {}
         self._executor = self.world.executor()
         self._executor.add_node(self.ros)
         self._button = StopButton(self)
@@ -68,7 +68,7 @@ class RemoteControl(Guest):
     def _now(self) -> float:
         return 1e-9 * self.world.monotonic_ns()
 
-    def look(self) -> dict[str, ArmState]:
+    def look(self) -> dict[str, ReportedArm]:
         """Wait until each arm has reported, and return the states by namespace.
 
         Raises:
@@ -82,7 +82,7 @@ class RemoteControl(Guest):
             )
         return self.arms
 
-    def stop(self) -> dict[str, ArmState]:
+    def stop(self) -> dict[str, ReportedArm]:
         """Press the emergency stop until every arm has reported that the stop is in force and that the arm rests.
 
         Raises:
@@ -165,7 +165,7 @@ class RemoteControl(Guest):
         for name, kinds in self.ros.get_topic_names_and_types():
             if name.endswith(f"/{SLAVE_OPERATION.name}") and name not in self._reports and kinds:
                 self._reports[name] = Subscription(self, SLAVE_OPERATION, name)
-                self.arms[name.removesuffix(SLAVE_OPERATION.name).strip("/")] = ArmState()
+                self.arms[name.removesuffix(SLAVE_OPERATION.name).strip("/")] = ReportedArm()
         for name, reports in self._reports.items():
             arm = self.arms[name.removesuffix(SLAVE_OPERATION.name).strip("/")]
             while (taken := reports.take()) is not None:
@@ -173,7 +173,7 @@ class RemoteControl(Guest):
         self._executor.spin_once(timeout_sec=_PERIOD)
 
 
-def _note(arm: ArmState, data: bytes) -> None:
+def _note(arm: ReportedArm, data: bytes) -> None:
     """Store a report of an arm; bytes that are not a report are ignored."""
     try:
         report = read_reports(data)[0]

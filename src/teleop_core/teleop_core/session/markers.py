@@ -5,7 +5,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from teleop_core.bags.markers import Color, Marker, Shape
+from teleop_core.bags.markers import Color, Marker, MarkerShape
 from teleop_core.coupling.fixtures.reported_fixture import ReportedFixture, reported_fixture
 from teleop_core.coupling.mapping.gains import MotionScalingParameters
 from teleop_core.kernels import Array, length
@@ -22,7 +22,7 @@ _TOUCH = 0.05  # smallest force at which a wall counts as touched [N]
 _FREE: Color = (0.26, 0.52, 0.96, 0.25)
 _TOUCHED: Color = (0.90, 0.20, 0.15, 0.40)
 _WIDTH = 0.001  # width of a fixture's lines [m]
-_BODIES = {box.BOX.name: Shape.CUBE, sphere.SPHERE.name: Shape.SPHERE}
+_BODIES = {box.BOX.name: MarkerShape.CUBE, sphere.SPHERE.name: MarkerShape.SPHERE}
 _FORCE: Color = (0.90, 0.45, 0.10, 1.0)
 _MEASURED: Color = (0.76, 0.22, 0.04, 1.0)
 _COMMANDED: Color = (0.26, 0.52, 0.96, 1.0)
@@ -64,15 +64,15 @@ class ArmMarkers:
         """
         is_on, pose = bool(state.get("is_fixture_on")), np.array([0.0, 0, 0, 1, 0, 0, 0])
         if not is_on:
-            return Marker("fixture", self._slave, Shape.CUBE, is_shown=False)
+            return Marker("fixture", self._slave, MarkerShape.CUBE, is_shown=False)
         pose[:3] = [state[f"fixture_center_{axis}"] for axis in "xyz"]
         x, y, z = (state[f"fixture_size_{axis}"] for axis in "xyz")
         color = _TOUCHED if force > _TOUCH else _FREE
         fixture = reported_fixture(told, np.array((x, y, z)))
         if fixture.kind in _BODIES or fixture.fault:
-            shape = _BODIES.get(fixture.kind, Shape.CUBE)
+            shape = _BODIES.get(fixture.kind, MarkerShape.CUBE)
             return Marker("fixture", self._slave, shape, pose, (x, y, z), color)
-        return Marker("fixture", self._slave, Shape.LINE_LIST, pose, (_WIDTH, 0.0, 0.0),
+        return Marker("fixture", self._slave, MarkerShape.LINE_LIST, pose, (_WIDTH, 0.0, 0.0),
                       (*color[:3], 1.0), self._edges(fixture, state["gain"]))  # fmt: skip
 
     def _edges(self, fixture: ReportedFixture, gain: float) -> Array:
@@ -93,12 +93,14 @@ class ArmMarkers:
         ends = np.stack((stylus[:3], stylus[:3] + FORCE_SCALE * force))
         is_shown = float(length(force)) > _TOUCH
         scale = (0.004, 0.009, 0.01)
-        return Marker("force", self._master, Shape.ARROW, scale=scale, color=_FORCE, points=ends, is_shown=is_shown)
+        return Marker(
+            "force", self._master, MarkerShape.ARROW, scale=scale, color=_FORCE, points=ends, is_shown=is_shown
+        )
 
     def path(self, name: str, point: Array) -> Marker:
         """Append a point (3,) [m] to the tip's path ``measured`` or ``commanded``, and return the path's marker."""
         tail = self._tails[name]
         tail.append(point.copy())
         color, width = (_MEASURED, 0.002) if name == "measured" else (_COMMANDED, 0.001)
-        return Marker(name, self._slave, Shape.LINE_STRIP, scale=(width, 0.0, 0.0), color=color,
+        return Marker(name, self._slave, MarkerShape.LINE_STRIP, scale=(width, 0.0, 0.0), color=color,
                       points=np.array(tail), is_shown=len(tail) > 1)  # fmt: skip

@@ -19,7 +19,7 @@ class ArmModel(NamedTuple):
     J: Array
 
 
-class SimulatedArm(NamedTuple):
+class ArmParts(NamedTuple):
     """Model, control law and motion of the arm: pointers and plain arrays, which kernels take."""
 
     tip_fk: Any  # forward kinematics of the links as built

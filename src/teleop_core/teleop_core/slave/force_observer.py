@@ -13,7 +13,7 @@ from teleop_core.graph import copy
 from teleop_core.kernels import Array, Fields, PerJoint, inner, kernel
 from teleop_core.kernels.room import room
 from teleop_core.robots.dynamics.rigid_body import invert_positive, write_model
-from teleop_core.slave.arm import SimulatedArm
+from teleop_core.slave.arm import ArmParts
 from teleop_core.slave.friction import FrictionRecord
 
 _DAMPING = 1e-4
@@ -139,7 +139,7 @@ def forget(s: ObserverState, wrench: Array) -> None:
 
 
 @inner
-def estimate(p: ObserverRecord, s: ObserverState, arm: SimulatedArm, lag: float, dt: float, wrench: Array) -> None:
+def estimate(p: ObserverRecord, s: ObserverState, arm: ArmParts, lag: float, dt: float, wrench: Array) -> None:
     """Write the estimated force on the tip in axes of the slave's base, with a torque of zero.
 
     The estimate uses encoder positions, amplifier efforts, the control law's model and the plant's mean friction. The

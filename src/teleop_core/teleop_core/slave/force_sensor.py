@@ -12,7 +12,7 @@ import numpy as np
 from teleop_core.base import Within, parameter
 from teleop_core.graph import Noise, Row
 from teleop_core.kernels import Fields, Wrench, inner
-from teleop_core.slave.arm import SimulatedArm
+from teleop_core.slave.arm import ArmParts
 
 STANDARD_GRAVITY = 9.80665
 """Weight divided by mass [m/s²]; the weight acts along -z of the slave's base."""
@@ -115,7 +115,7 @@ class SensorNoise(Noise):
 
 
 @inner
-def sense(p: SensorRecord, s: SensorState, arm: SimulatedArm, row: Row) -> None:
+def sense(p: SensorRecord, s: SensorState, arm: ArmParts, row: Row) -> None:
     """Write ``slave_measured_cf``: the sensor's measurement of ``slave_true_cf``.
 
     The low-pass is exact for a force that is constant during a tick.

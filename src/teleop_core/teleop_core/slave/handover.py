@@ -13,13 +13,13 @@ from typing import Any
 import numpy as np
 
 from teleop_core.kernels import Array, kernel
-from teleop_core.slave.arm import SimulatedArm
+from teleop_core.slave.arm import ArmParts
 
 _NO_LIMIT = 1e6  # factor on the drives' limits, so that the compared efforts are not clipped
 _TICKS = 20  # number of ticks after which the filter of a derivative has forgotten one difference
 
 
-def missing_effort(arm: SimulatedArm, speed: Array, before: Array, dt: float, ticks: int = _TICKS) -> Array:
+def missing_effort(arm: ArmParts, speed: Array, before: Array, dt: float, ticks: int = _TICKS) -> Array:
     """Effort (n,) with the gains ``before`` minus the effort with the present gains [N·m or N].
 
     Both efforts are computed for an arm that continues at its present, constant speed. The arm itself is not changed.

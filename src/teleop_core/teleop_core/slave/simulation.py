@@ -5,7 +5,7 @@ import math
 from teleop_core.graph import Row, copy, topics
 from teleop_core.kernels import Array, Fields, PerJoint, call_address, inner, kernel, pose_from_transform
 from teleop_core.robots.dynamics.rigid_body import write_model
-from teleop_core.slave.arm import SimulatedArm
+from teleop_core.slave.arm import ArmParts
 from teleop_core.slave.elastic import ElasticRecord, ElasticState, integrate_elastic
 from teleop_core.slave.force_observer import ObserverRecord, ObserverState, estimate, forget
 from teleop_core.slave.force_sensor import SensorRecord, SensorState, sense
@@ -55,7 +55,7 @@ def _measure(p: SimulationRecord, s: SimulationState, q: Array, dt: float) -> No
 
 
 @inner
-def _control(p: SimulationRecord, s: SimulationState, arm: SimulatedArm, dt: float) -> None:
+def _control(p: SimulationRecord, s: SimulationState, arm: ArmParts, dt: float) -> None:
     """Write the effort that the control law demands."""
     n = arm.q.shape[0]
     copy(s.measured, arm.measured)
@@ -69,7 +69,7 @@ def _control(p: SimulationRecord, s: SimulationState, arm: SimulatedArm, dt: flo
 
 
 @inner
-def _brake(p: SimulationRecord, s: SimulationState, arm: SimulatedArm, dt: float) -> None:
+def _brake(p: SimulationRecord, s: SimulationState, arm: ArmParts, dt: float) -> None:
     """Let brakes as strong as the drives stop the arm; this works even if its dynamics have diverged."""
     for i in range(arm.q.shape[0]):
         fastest, less = p.speed_limit[i] * 1.5, p.braking[i] * dt
@@ -83,7 +83,7 @@ def _brake(p: SimulationRecord, s: SimulationState, arm: SimulatedArm, dt: float
 
 
 @inner
-def _see_joints(p: SimulationRecord, s: SimulationState, arm: SimulatedArm) -> None:
+def _see_joints(p: SimulationRecord, s: SimulationState, arm: ArmParts) -> None:
     """Write the true joint positions, behind gears that bend and tendons with play."""
     if p.has_gears:
         copy(s.link, arm.joints)
@@ -93,7 +93,7 @@ def _see_joints(p: SimulationRecord, s: SimulationState, arm: SimulatedArm) -> N
 
 
 @inner
-def _touch(p: SimulationRecord, s: SimulationState, arm: SimulatedArm, row: Row) -> None:
+def _touch(p: SimulationRecord, s: SimulationState, arm: ArmParts, row: Row) -> None:
     """Compute the contact between tool and object, at the true positions of the links."""
     if p.has_gears:
         touch(p, arm.contacts, arm, s.link, s.link_speed, row.slave_true_cf)
@@ -102,7 +102,7 @@ def _touch(p: SimulationRecord, s: SimulationState, arm: SimulatedArm, row: Row)
 
 
 @inner
-def _estimate(p: SimulationRecord, s: SimulationState, arm: SimulatedArm, row: Row, dt: float) -> None:
+def _estimate(p: SimulationRecord, s: SimulationState, arm: ArmParts, row: Row, dt: float) -> None:
     """Write the tip force estimated from joints and drives; with brakes on there is no estimate."""
     if p.is_estimated and not row.slave_operation[_BRAKED] > 0.0:
         estimate(p, s, arm, SPEED_LAG, dt, row.slave_estimated_cf)
@@ -111,7 +111,7 @@ def _estimate(p: SimulationRecord, s: SimulationState, arm: SimulatedArm, row: R
 
 
 @inner
-def _move_on(p: SimulationRecord, s: SimulationState, arm: SimulatedArm, braked: bool, dt: float) -> None:
+def _move_on(p: SimulationRecord, s: SimulationState, arm: ArmParts, braked: bool, dt: float) -> None:
     """Advance the arm by a tick, decelerated by its brakes or driven by its drives."""
     if p.move != 0:
         call_address(p.move, p.move_block)
@@ -127,7 +127,7 @@ def _move_on(p: SimulationRecord, s: SimulationState, arm: SimulatedArm, braked:
 
 
 @kernel
-def simulation_step(p: SimulationRecord, s: SimulationState, arm: SimulatedArm, row: Row, dt: float) -> None:
+def simulation_step(p: SimulationRecord, s: SimulationState, arm: ArmParts, row: Row, dt: float) -> None:
     """One control tick of a simulated arm: write its encoder positions and the pose of its tip.
 
     Measured values are sampled at the start of the tick, together with the setpoint with which they are compared. Then

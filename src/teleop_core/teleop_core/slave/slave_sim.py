@@ -12,7 +12,7 @@ from teleop_core.robots import load_robot_set
 from teleop_core.robots.drives import ACCELERATION, GRAVITY
 from teleop_core.robots.selection import RobotParameters
 from teleop_core.slave import handover, simulation, stability, transmission
-from teleop_core.slave.arm import SimulatedArm
+from teleop_core.slave.arm import ArmParts
 from teleop_core.slave.controllers import CONTROLLERS, per_joint
 from teleop_core.slave.elastic import gear_damping
 from teleop_core.slave.force_sensor import ForceSensorParameters, SensorNoise
@@ -93,7 +93,7 @@ class SlaveSim(RunningStage):
         gains = self._gains(parameters, physics.viscous)
         is_as_drawn = len(physics.tip_geometry) == 0
         touched = WORLD_OBJECTS.find(parameters.world.kind.kind)
-        self.arm = SimulatedArm(
+        self.arm = ArmParts(
             tip_fk=self.robot.fk_pointer if is_as_drawn else pointer(dh_kernels.fk, FK),
             jacobian=pointer(self.robot.kernels.jacobian if is_as_drawn else dh_kernels.jacobian, FK),
             distance=touched.pointer,

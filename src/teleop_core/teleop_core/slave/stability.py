@@ -15,7 +15,7 @@ from teleop_core.kernels import IS_COMPILED, Array, bound, records
 from teleop_core.kernels.callables import raise_pending
 from teleop_core.robots.drives import independent_acceleration
 from teleop_core.robots.robot import Robot
-from teleop_core.slave.arm import SimulatedArm
+from teleop_core.slave.arm import ArmParts
 from teleop_core.slave.controllers import CONTROLLERS, Controller
 from teleop_core.slave.plants import PER_JOINT
 from teleop_core.slave.simulation import SimulationRecord, SimulationState, simulation_step
@@ -81,7 +81,7 @@ class ClosedLoop(NamedTuple):
 
     p: SimulationRecord
     s: SimulationState
-    arm: SimulatedArm
+    arm: ArmParts
     row: Row
     dt: float
 
@@ -98,7 +98,7 @@ class ClosedLoop(NamedTuple):
             p["viscous"] = np.minimum(p["viscous"], _STIFFEST * inertia / self.dt)
         p["is_ideal"], p["has_noise"], p["is_estimated"] = 1, 0, 0
         parts = (np.array(part) if isinstance(part, np.ndarray) else part for part in self.arm)
-        arm = SimulatedArm(*parts)
+        arm = ArmParts(*parts)
         arm.contacts["is_near"] = 0
         return ClosedLoop(p, s, arm, row, self.dt)
 
@@ -114,7 +114,7 @@ class ClosedLoop(NamedTuple):
         return made
 
 
-def loop_key(p: SimulationRecord, arm: SimulatedArm) -> tuple[bytes, ...]:
+def loop_key(p: SimulationRecord, arm: ArmParts) -> tuple[bytes, ...]:
     """Numbers that define the control loop of an arm, independent of its position.
 
     Args:

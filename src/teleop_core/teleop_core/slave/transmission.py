@@ -3,7 +3,7 @@
 from typing import Annotated
 
 from teleop_core.kernels import Array, Fields, PerJoint, inner
-from teleop_core.slave.arm import SimulatedArm
+from teleop_core.slave.arm import ArmParts
 
 LONGEST_DELAY = 30
 """Largest delay of efforts [ticks]."""
@@ -52,7 +52,7 @@ def follow_encoders(p: TransmissionRecord, s: TransmissionState, q: Array, coupl
 
 
 @inner
-def drive(p: TransmissionRecord, s: TransmissionState, arm: SimulatedArm) -> None:
+def drive(p: TransmissionRecord, s: TransmissionState, arm: ArmParts) -> None:
     """Turn the commanded effort into the effort that the motors give.
 
     Args:

@@ -22,7 +22,7 @@ from teleop_lab.calibration import appendix_e
 from teleop_lab.calibration.accuracy import Accuracy, at_fresh, at_measured, left_out
 from teleop_lab.calibration.identify import Found, identify
 from teleop_lab.calibration.measured import CalibrationError, Measured, read_measured
-from teleop_lab.calibration.model import FRAME, Model
+from teleop_lab.calibration.model import FRAME, ChainModel
 from teleop_lab.calibration.poses import random_poses
 from teleop_lab.calibration.simulate import RULER, chosen_poses, default_errors, ruled, tracked, true_errors
 
@@ -33,10 +33,10 @@ __all__ = [
     "Accuracy",
     "Calibration",
     "CalibrationError",
+    "ChainModel",
     "Found",
     "LinkErrors",
     "Measured",
-    "Model",
     "appendix_e",
     "calibrate",
     "read_measured",
@@ -109,7 +109,7 @@ def calibrate(
         UnknownNameError: ``fit`` contains a name that is not a link error.
         CalibrationError: There are too few poses, errors cannot be distinguished, or the search does not converge.
     """
-    model = Model.of(robot)
+    model = ChainModel.of(robot)
     found = identify(model, measured, fit, finds_frame=finds_frame, keeps_all=keeps_all)
     return Calibration(robot, measured, found, at_measured(found, measured), left_out(found, measured))
 
@@ -144,7 +144,7 @@ def simulate(
     Raises:
         ParameterError, UnknownNameError, CalibrationError: The reasons of :func:`calibrate`, or an impossible value.
     """
-    model, rng = Model.of(robot), np.random.default_rng(seed)
+    model, rng = ChainModel.of(robot), np.random.default_rng(seed)
     truth = true_errors(robot, default_errors(robot) if errors is None else errors, rng)
     is_ruler = noise == RULER
     wanted = fit if fit is not None else "offsets" if is_ruler else "all"
@@ -175,4 +175,4 @@ def _tried(
     if finds_frame:
         return left_out(found, measured)
     q = random_poses(found.model.robot, FRESH, rng)
-    return at_fresh(found, tracked(Model.of(found.model.robot), truth, q, 0.0, rng))
+    return at_fresh(found, tracked(ChainModel.of(found.model.robot), truth, q, 0.0, rng))

@@ -26,9 +26,9 @@ def corrected_table(robot: Robot, errors: LinkErrors) -> Table:
     Raises:
         ParameterError: The robot is not a chain.
     """
-    from teleop_lab.calibration.model import Model
+    from teleop_lab.calibration.model import ChainModel
 
-    chain = Model.of(robot).chain
+    chain = ChainModel.of(robot).chain
     rows = list(_rows(robot, chain, errors))
     table: Table = {"name": f"{robot.name}_calibrated", "convention": "standard"}
     task = [name for name, is_on in zip(DIRECTIONS, robot.task_mask, strict=True) if is_on]

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from teleop_core.kernels.geometry import Array
-from teleop_lab.calibration.model import FRAME, Model
+from teleop_lab.calibration.model import FRAME, ChainModel
 
 WORST_CONDITION = 100.0
 # An entry has no effect if the tip moves by less than this [m] per metre (an angle is multiplied by the arm's length).
@@ -35,7 +35,7 @@ class Left:
 
 
 def select(
-    model: Model, J: Array, names: Sequence[str], worst_condition: float
+    model: ChainModel, J: Array, names: Sequence[str], worst_condition: float
 ) -> tuple[tuple[str, ...], tuple[Left, ...]]:
     """Return the entries that readings with the Jacobian J (m, 4n + 6) can distinguish, and the others with reasons."""
     column = {name: J[:, model.names.index(name)] for name in names}
@@ -66,7 +66,7 @@ def condition(columns: Array) -> float:
     return float(values[0] / values[-1])
 
 
-def _weakest(model: Model, column: dict[str, Array], kept: list[str]) -> str:
+def _weakest(model: ChainModel, column: dict[str, Array], kept: list[str]) -> str:
     """Entry with the largest part in the combination that the readings determine least."""
     _, _, Vt = np.linalg.svd(_unit_columns(np.column_stack([column[k] for k in kept])))
     ease = [_FRAME if name in FRAME else _OFFSET if name in model.offsets else _LINK for name in kept]

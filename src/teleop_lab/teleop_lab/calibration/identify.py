@@ -11,7 +11,7 @@ from teleop_core.kernels.geometry import Array
 from teleop_core.robots.link_errors import LinkErrors
 from teleop_lab.calibration.identifiable import WORST_CONDITION, Left, condition, select
 from teleop_lab.calibration.measured import CalibrationError, Measured
-from teleop_lab.calibration.model import FRAME, Model, aligned
+from teleop_lab.calibration.model import FRAME, ChainModel, aligned
 
 LEVEL = 0.95
 """Level of the confidence intervals."""
@@ -44,7 +44,7 @@ class Found:
     condition: float
     residual: float
     freedom: int
-    model: Model
+    model: ChainModel
 
     def equivalent(self, errors: LinkErrors, q: Array) -> dict[str, float]:
         """Values that a perfect fit would find for an arm with the given errors [m, rad].
@@ -69,7 +69,7 @@ class Found:
         return LinkErrors.from_vector(self.vector[: 4 * self.model.chain.n])
 
 
-def residuals(model: Model, measured: Measured, vector: Array) -> Array:
+def residuals(model: ChainModel, measured: Measured, vector: Array) -> Array:
     """Readings that the model predicts, minus the real readings (m,) [m]."""
     tips = model.tips(measured.joints, vector)
     if measured.points is not None:
@@ -80,7 +80,7 @@ def residuals(model: Model, measured: Measured, vector: Array) -> Array:
     return np.asarray(np.linalg.norm(way, axis=1) - measured.distances)
 
 
-def slopes(model: Model, measured: Measured, vector: Array) -> Array:
+def slopes(model: ChainModel, measured: Measured, vector: Array) -> Array:
     """Derivatives of :func:`residuals` with respect to all entries of the model, (m, 4n + 6)."""
     J = model.jacobian(measured.joints, vector)
     if measured.points is not None:
@@ -91,7 +91,7 @@ def slopes(model: Model, measured: Measured, vector: Array) -> Array:
     return np.einsum("ni,nij->nj", way, J - model.jacobian(measured.origins, vector))
 
 
-def wanted_names(model: Model, fit: str | Sequence[str]) -> tuple[str, ...]:
+def wanted_names(model: ChainModel, fit: str | Sequence[str]) -> tuple[str, ...]:
     """Names of the entries to find: "all" link errors, joint "offsets", or the given names.
 
     Raises:
@@ -108,7 +108,7 @@ def wanted_names(model: Model, fit: str | Sequence[str]) -> tuple[str, ...]:
 
 
 def identify(
-    model: Model,
+    model: ChainModel,
     measured: Measured,
     fit: str | Sequence[str] = "all",
     *,
@@ -168,7 +168,7 @@ def _pruned(found: Found, measured: Measured) -> Found:
         found = _solved(found.model, measured, names, left)
 
 
-def aligned_model(model: Model, measured: Measured) -> Model:
+def aligned_model(model: ChainModel, measured: Measured) -> ChainModel:
     """Return the model with the frame in which the nominal arm fits the points best.
 
     Raises:
@@ -179,7 +179,7 @@ def aligned_model(model: Model, measured: Measured) -> Model:
     if whole.sum() < 3:
         raise CalibrationError("a frame is found from at least three poses with x, y and z")
     drawn = model.tips(measured.joints[whole], np.zeros(len(model.names)))
-    return Model(model.robot, model.chain, aligned(drawn, measured.points[whole]))
+    return ChainModel(model.robot, model.chain, aligned(drawn, measured.points[whole]))
 
 
 def _check_count(measured: Measured, entries: int) -> None:
@@ -191,7 +191,7 @@ def _check_count(measured: Measured, entries: int) -> None:
         )
 
 
-def _solved(model: Model, measured: Measured, names: tuple[str, ...], left: tuple[Left, ...]) -> Found:
+def _solved(model: ChainModel, measured: Measured, names: tuple[str, ...], left: tuple[Left, ...]) -> Found:
     at = [model.names.index(name) for name in names]
     vector = np.zeros(len(model.names))
 
@@ -223,7 +223,7 @@ def _solved(model: Model, measured: Measured, names: tuple[str, ...], left: tupl
     )
 
 
-def _drawn(model: Model, measured: Measured, left: tuple[Left, ...]) -> Found:
+def _drawn(model: ChainModel, measured: Measured, left: tuple[Left, ...]) -> Found:
     """Result without any found error; it means that the readings agree with the nominal arm."""
     vector, none = np.zeros(len(model.names)), np.zeros(0)
     rest = residuals(model, measured, vector)

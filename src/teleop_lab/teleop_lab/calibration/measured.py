@@ -134,9 +134,9 @@ def _letters_of(name: str) -> str:
 
 
 def _slides(robot: Robot) -> tuple[str, ...]:
-    from teleop_lab.calibration.model import Model
+    from teleop_lab.calibration.model import ChainModel
 
-    kinds = Model.of(robot).chain.kinds
+    kinds = ChainModel.of(robot).chain.kinds
     return tuple(n for n, kind in zip(robot.joint_names, kinds, strict=True) if abs(kind) > 1.5)
 
 

@@ -42,7 +42,7 @@ class Frame:
 
 
 @dataclass(frozen=True, eq=False)
-class Model:
+class ChainModel:
     """Tip of a chain as a function of the vector of unknowns: 4n link errors, then :data:`FRAME`.
 
     Args:
@@ -56,7 +56,7 @@ class Model:
     frame: Frame
 
     @staticmethod
-    def of(robot: Robot, frame: Frame | None = None) -> "Model":
+    def of(robot: Robot, frame: Frame | None = None) -> "ChainModel":
         """Return the model of a robot that is a chain.
 
         Raises:
@@ -66,7 +66,7 @@ class Model:
         if chain is None:
             needed = "a chain of links, such as rcrt1, puma560 or a Denavit-Hartenberg table"
             raise ParameterError("robot", robot.name, needed)
-        return Model(robot, chain, frame or Frame.known())
+        return ChainModel(robot, chain, frame or Frame.known())
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -6,7 +6,7 @@ import numpy as np
 
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots.robot import Robot
-from teleop_lab.calibration.model import Model
+from teleop_lab.calibration.model import ChainModel
 
 CANDIDATES = 400
 """Number of random poses from which the best poses are chosen."""
@@ -18,7 +18,7 @@ def random_poses(robot: Robot, count: int, rng: np.random.Generator) -> Array:
     return rng.uniform(robot.lower, robot.upper, (count, robot.n))
 
 
-def optimal_poses(model: Model, count: int, names: Sequence[str], rng: np.random.Generator) -> Array:
+def optimal_poses(model: ChainModel, count: int, names: Sequence[str], rng: np.random.Generator) -> Array:
     """Joint vectors (count, n) at which points of the tip are most informative about the named entries.
 
     Of :data:`CANDIDATES` random poses, each step chooses the pose that increases the determinant of the information

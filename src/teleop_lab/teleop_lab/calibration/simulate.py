@@ -11,7 +11,7 @@ from teleop_core.robots.robot import Robot
 from teleop_lab.calibration import appendix_e, identifiable
 from teleop_lab.calibration.identify import wanted_names
 from teleop_lab.calibration.measured import CalibrationError, Measured
-from teleop_lab.calibration.model import Model, rotation_of
+from teleop_lab.calibration.model import ChainModel, rotation_of
 from teleop_lab.calibration.poses import optimal_poses, random_poses
 
 TOLERANCES = {"cnc": 20e-6, "prototype": 100e-6}
@@ -50,7 +50,7 @@ def true_errors(robot: Robot, texts: Sequence[str], rng: np.random.Generator) ->
             continue
         given[name.strip()] = _number(text, value)
     fixed = LinkErrors.of(robot, given)
-    names = Model.of(robot).names[: len(vector)]
+    names = ChainModel.of(robot).names[: len(vector)]
     is_given = np.array([name in given for name in names])
     return LinkErrors.from_vector(np.where(is_given, fixed.vector, vector))
 
@@ -58,7 +58,7 @@ def true_errors(robot: Robot, texts: Sequence[str], rng: np.random.Generator) ->
 def _drawn(robot: Robot, name: str, rng: np.random.Generator) -> Array:
     if name not in TOLERANCES:
         raise UnknownNameError("errors", name, (*TOLERANCES, "NAME=VALUE, such as d3=5.5e-3"))
-    model, width = Model.of(robot), TOLERANCES[name]
+    model, width = ChainModel.of(robot), TOLERANCES[name]
     units = [model.unit(entry) for entry in model.names[: 4 * robot.n]]
     widths = np.array([width if unit == "m" else width / SEAT for unit in units])
     return np.asarray(rng.uniform(-widths, widths))
@@ -71,7 +71,9 @@ def _number(text: str, value: str) -> float:
         raise ParameterError("errors", text, "NAME=NUMBER, such as d3=5.5e-3 [m, rad]") from None
 
 
-def chosen_poses(model: Model, count: int, choose: str, fit: str | Sequence[str], rng: np.random.Generator) -> Array:
+def chosen_poses(
+    model: ChainModel, count: int, choose: str, fit: str | Sequence[str], rng: np.random.Generator
+) -> Array:
     """Joint vectors (count, n) for a tracker: "random", or "optimal" for the entries to be found.
 
     Raises:
@@ -91,7 +93,13 @@ def chosen_poses(model: Model, count: int, choose: str, fit: str | Sequence[str]
 
 
 def tracked(
-    model: Model, errors: LinkErrors, q: Array, noise: float, rng: np.random.Generator, *, is_elsewhere: bool = False
+    model: ChainModel,
+    errors: LinkErrors,
+    q: Array,
+    noise: float,
+    rng: np.random.Generator,
+    *,
+    is_elsewhere: bool = False,
 ) -> Measured:
     """Simulated readings of a tracker at poses: the position of the tip plus noise on each axis.
 
@@ -114,7 +122,7 @@ def tracked(
     return Measured(joints=q, points=points)
 
 
-def ruled(model: Model, errors: LinkErrors, count: int) -> Measured:
+def ruled(model: ChainModel, errors: LinkErrors, count: int) -> Measured:
     """Simulated readings of a ruler with 0.5 mm divisions, along one axis after the other, as in appendix E."""
     moves = appendix_e.ruler_moves(model.robot, count)
     assert moves.origins is not None
@@ -123,6 +131,6 @@ def ruled(model: Model, errors: LinkErrors, count: int) -> Measured:
     return Measured(joints=moves.joints, origins=moves.origins, distances=read, labels=moves.labels)
 
 
-def true_tips(model: Model, errors: LinkErrors, q: Array) -> Array:
+def true_tips(model: ChainModel, errors: LinkErrors, q: Array) -> Array:
     """Positions of the tip (N, 3) [m] of an arm with link errors, in the arm's base."""
-    return Model.of(model.robot).tips(q, np.concatenate((errors.vector, np.zeros(6))))
+    return ChainModel.of(model.robot).tips(q, np.concatenate((errors.vector, np.zeros(6))))

@@ -40,7 +40,7 @@ _BASE_ERROR = 0.015  # standard deviation of a base lag that is not known [s]
 _STARTS = 4  # first attempts of a session that are left out
 
 
-class Row(NamedTuple):
+class PredictedMean(NamedTuple):
     """A predicted mean of all persons of a study, with its 95 % interval."""
 
     study: str
@@ -51,14 +51,16 @@ class Row(NamedTuple):
     high: float
 
 
-def _row(study: str, cell: str, measure: str, value: float, persons: int, kind: str, late: float = 0.0) -> Row:
+def _row(
+    study: str, cell: str, measure: str, value: float, persons: int, kind: str, late: float = 0.0
+) -> PredictedMean:
     """Row with the interval of the mean of ``persons``; ``late`` is the error of a lag not known, of the value."""
     scale = min(value, 1.0 - value) if kind == "share" else value
     error = scale * math.hypot(_PERSONS[kind] / math.sqrt(persons), _MODEL[kind], late)
     if kind == "share":
         error = math.hypot(error, 0.01)
     most = 1.0 if kind == "share" else math.inf
-    return Row(study, cell, measure, value, max(value - 1.96 * error, 0.0), min(value + 1.96 * error, most))
+    return PredictedMean(study, cell, measure, value, max(value - 1.96 * error, 0.0), min(value + 1.96 * error, most))
 
 
 def _pressed(way: float, width: float, lag: float, dimensions: int = 2, cost: float = 1.0, wait: float = 0.0) -> Array:
@@ -68,7 +70,7 @@ def _pressed(way: float, width: float, lag: float, dimensions: int = 2, cost: fl
     return lm.presses(p, way, width, lag, count=6000)
 
 
-def _instructions() -> Iterator[Row]:
+def _instructions() -> Iterator[PredictedMean]:
     for name, cost in INSTRUCTIONS.items():
         for way in (400.0, 770.0):
             for width in (8.0, 24.0, 70.0):
@@ -84,7 +86,7 @@ def _instructions() -> Iterator[Row]:
                 yield _row("a_instructions", cell, "throughput_bits_s", bits / time, 12, "time", late)
 
 
-def _clicks(cell: str, times: Array, beside: Array) -> Iterator[Row]:
+def _clicks(cell: str, times: Array, beside: Array) -> Iterator[PredictedMean]:
     for measure, value in (("time_ms", times.mean()), ("median_time_ms", np.median(times))):
         yield _row("b_one_click", cell, measure, 1e3 * value, 56, "time")
     yield _row("b_one_click", cell, "median_distance_px", np.median(beside), 56, "distance")
@@ -122,7 +124,7 @@ def straight(lag: float, radius: float, seeds: int = 4) -> tuple[Array, Array]:
     return np.array(times), np.array(beside)
 
 
-def _one_click() -> Iterator[Row]:
+def _one_click() -> Iterator[PredictedMean]:
     for added in (0.0, 0.0625, 0.125, 0.25):
         lag = 0.050 + added - STATION
         for radius in (25.0, 15.0, 40.0):  # the radius is not known; that of 25 px is the prediction
@@ -132,7 +134,7 @@ def _one_click() -> Iterator[Row]:
             yield from _clicks(f"straight_{1e3 * added:g}{mark}", *straight(lag, radius))
 
 
-def _rounds() -> Iterator[Row]:
+def _rounds() -> Iterator[PredictedMean]:
     for added in (0.0, 0.075, 0.150, 0.225):
         for base in (0.015, 0.0, 0.020):  # not measured; 15 ms is the prediction
             mark = "" if base == 0.015 else f"@base_{1e3 * base:g}"
@@ -173,7 +175,7 @@ def rings(way: float, width: float, lag: float, seeds: int = 6) -> Array:
     return np.array(times)
 
 
-def _teleoperated() -> Iterator[Row]:
+def _teleoperated() -> Iterator[PredictedMean]:
     for way, width in ((0.118, 0.02), (0.236, 0.02), (0.118, 0.01), (0.236, 0.01)):
         for base in (0.1, 0.05, 0.15):  # not measured; 100 ms is the prediction
             mark = "" if base == 0.1 else f"@base_{1e3 * base:g}"
@@ -182,7 +184,7 @@ def _teleoperated() -> Iterator[Row]:
             yield _row("d_teleoperated_ring", cell, "median_s", float(np.median(times)), 24, "time", 0.1)
 
 
-def _course() -> Iterator[Row]:
+def _course() -> Iterator[PredictedMean]:
     for added in (0.0, 0.150):
         pooled: dict[str, list[float]] = {}
         for width, diameter in ((40, 400), (60, 400), (90, 400), (60, 250), (60, 550)):
@@ -203,7 +205,7 @@ def _course() -> Iterator[Row]:
             yield _row("e_small_course", f"pooled_{1e3 * added:g}", measure, float(np.mean(found_values)), 4, kind)
 
 
-def predict() -> list[Row]:
+def predict() -> list[PredictedMean]:
     """Rows of all studies; takes some minutes."""
     return [row for study in (_instructions, _one_click, _rounds, _teleoperated, _course) for row in study()]
 
@@ -246,11 +248,13 @@ def predict_simply() -> list[tuple[str, str, str, str, float]]:
     return found
 
 
-def registered() -> list[Row]:
+def registered() -> list[PredictedMean]:
     """Rows of the registered prediction."""
     with files("teleop_lab.experiments").joinpath("blind_predictions.csv").open(encoding="utf-8") as file:
         return [
-            Row(row["study"], row["cell"], row["measure"], *(float(row[name]) for name in Row._fields[3:]))
+            PredictedMean(
+                row["study"], row["cell"], row["measure"], *(float(row[name]) for name in PredictedMean._fields[3:])
+            )
             for row in csv.DictReader(file)
         ]
 
@@ -289,7 +293,7 @@ def main(folder: Path) -> None:
     """Write both tables into a folder."""
     with (folder / "blind_predictions.csv").open("w", newline="", encoding="utf-8") as file:
         table = csv.writer(file, lineterminator="\n")
-        table.writerow(Row._fields)
+        table.writerow(PredictedMean._fields)
         table.writerows((*row[:3], *(f"{value:.4g}" for value in row[3:])) for row in predict())
     with (folder / "blind_simple.csv").open("w", newline="", encoding="utf-8") as file:
         table = csv.writer(file, lineterminator="\n")

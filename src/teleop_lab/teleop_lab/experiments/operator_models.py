@@ -29,7 +29,7 @@ _EYE, _PEOPLE, _MOST = 0.11, 1500, 40
 _NOISE = np.random.default_rng(7).standard_normal((_MOST, _PEOPLE))
 
 
-class Model(NamedTuple):
+class PointingModel(NamedTuple):
     """A model of pointing.
 
     Attributes:
@@ -75,19 +75,19 @@ def _capacity(p: Array, ratio: float, lag: float) -> tuple[float, float]:
 
 
 MODELS = (
-    Model("sure", (0.1, 0.08, 0.02, 0.05), _sure),
-    Model("doubt", (0.03, 0.102, 0.315, 0.0194, 0.87), _doubt),
-    Model("capacity", (0.15, 0.3, 0.17, 1.0, 2.0), _capacity),
+    PointingModel("sure", (0.1, 0.08, 0.02, 0.05), _sure),
+    PointingModel("doubt", (0.03, 0.102, 0.315, 0.0194, 0.87), _doubt),
+    PointingModel("capacity", (0.15, 0.3, 0.17, 1.0, 2.0), _capacity),
 )
 
 
-def predicted(model: Model, p: Array, lag: int) -> tuple[Array, float]:
+def predicted(model: PointingModel, p: Array, lag: int) -> tuple[Array, float]:
     """Times at the law's indices of difficulty [s], and mean share of misses, at a lag of MacKenzie and Ware."""
     pressed = [model.press(p, float(2.0**bits - 1.0), float(lm.LAGS[lag])) for bits in _BITS]
     return np.array([time for time, _ in pressed]), float(_SHARES @ np.array([miss for _, miss in pressed]))
 
 
-def deviations(model: Model, p: Array, lag: int) -> Array:
+def deviations(model: PointingModel, p: Array, lag: int) -> Array:
     """Deviations from the law's times, the mean time and the misses at a lag, in standard deviations (8,)."""
     times, miss = predicted(model, p, lag)
     law = lm.INTERCEPT + lm.SLOPES[lag] * _BITS
@@ -97,7 +97,7 @@ def deviations(model: Model, p: Array, lag: int) -> Array:
     )
 
 
-def fit(model: Model, lags: tuple[int, ...] = (0, 1, 2, 3)) -> Array:
+def fit(model: PointingModel, lags: tuple[int, ...] = (0, 1, 2, 3)) -> Array:
     """Constants of the greatest likelihood at some of the lags, with normal errors of the printed numbers."""
 
     def loss(p: Array) -> float:

@@ -8,9 +8,9 @@
 
 from teleop_lab.studies.dataset import dataset_of
 from teleop_lab.studies.study import Explained, Study, read_study, sweep
-from teleop_lab.studies.tuning import Range, Trial, Tuned, Tuning, read_tuning
+from teleop_lab.studies.tuning import SearchRange, Trial, Tuned, Tuning, read_tuning
 
 __all__ = [
-    "Explained", "Range", "Study", "Trial", "Tuned", "Tuning", "dataset_of", "read_study",
+    "Explained", "SearchRange", "Study", "Trial", "Tuned", "Tuning", "dataset_of", "read_study",
     "read_tuning", "sweep",
 ]  # fmt: skip

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from teleop_core.evaluation.score import keys
-from teleop_lab.studies.point import Result
+from teleop_lab.studies.point import PointResult
 
 if TYPE_CHECKING:
     import xarray
@@ -25,7 +25,7 @@ def units_of_scores() -> dict[str, str]:
 def dataset_of(
     coordinates: Mapping[str, object],
     metrics: Sequence[str],
-    results: Sequence[Result | None],
+    results: Sequence[PointResult | None],
     about: Mapping[str, object],
 ) -> "xarray.Dataset":
     """Results as an xarray data set.

@@ -20,7 +20,7 @@ from teleop_core.session import api, configuration
 
 
 @dataclass(frozen=True)
-class Key:
+class PointKey:
     """Digests of everything that a result depends on: the parameters and the code."""
 
     recipe: str
@@ -45,7 +45,7 @@ class Point:
     settings: Mapping[str, api.Setting]
     seed: int
     length: float
-    key: Key
+    key: PointKey
 
     @property
     def name(self) -> str:
@@ -55,7 +55,7 @@ class Point:
 
 
 @dataclass(frozen=True)
-class Result:
+class PointResult:
     """Result of a point: scores, or an error.
 
     Attributes:
@@ -67,7 +67,7 @@ class Result:
     """
 
     name: str
-    key: Key
+    key: PointKey
     scores: Mapping[str, float | None]
     error: str
     seconds: float
@@ -77,7 +77,7 @@ class Result:
         return json.dumps(asdict(self))
 
     @staticmethod
-    def from_json(text: str) -> "Result":
+    def from_json(text: str) -> "PointResult":
         """Return the result that :meth:`to_json` converted to a text.
 
         Raises:
@@ -85,8 +85,8 @@ class Result:
         """
         found = json.loads(text)
         try:
-            key = Key(**found.pop("key"))
-            return Result(key=key, **found)
+            key = PointKey(**found.pop("key"))
+            return PointResult(key=key, **found)
         except (AttributeError, KeyError, TypeError) as error:
             raise ValueError(str(error)) from error
 
@@ -97,10 +97,10 @@ def recipe_of(made: configuration.Configuration) -> str:
     return hashlib.sha256("\n".join(lines).encode()).hexdigest()[:20]
 
 
-def point_key(recipe: str, seed: int, metrics: Sequence[str], code: str) -> Key:
+def point_key(recipe: str, seed: int, metrics: Sequence[str], code: str) -> PointKey:
     """Key of a point; any change of parameters, seed, scores or code changes the key."""
     text = json.dumps([recipe, seed, sorted(metrics)])
-    return Key(hashlib.sha256(text.encode()).hexdigest()[:20], code)
+    return PointKey(hashlib.sha256(text.encode()).hexdigest()[:20], code)
 
 
 @cache
@@ -162,7 +162,7 @@ def _kept(metrics: tuple[str, ...]) -> frozenset[str] | None:
     return None if metrics in _READ_MORE else streams_of(metrics)
 
 
-def compute(point: Point, metrics: Sequence[str], recordings: Path | None) -> Result:
+def compute(point: Point, metrics: Sequence[str], recordings: Path | None) -> PointResult:
     """Run a point's session and score it; if the session fails, the result contains the error."""
     begin = time.monotonic()
     scores: dict[str, float | None] = {}
@@ -179,4 +179,4 @@ def compute(point: Point, metrics: Sequence[str], recordings: Path | None) -> Re
         error = " ".join(str(raised).split())
     except Exception as raised:  # a user's part may raise any error; the result records it, and the study continues
         error = f"{type(raised).__name__}: {' '.join(str(raised).split())}"
-    return Result(point.name, point.key, scores, error, time.monotonic() - begin)
+    return PointResult(point.name, point.key, scores, error, time.monotonic() - begin)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from teleop_core.base.errors import SessionError
-from teleop_lab.studies.point import Point, Result
+from teleop_lab.studies.point import Point, PointResult
 
 FORMAT = 1
 _ABOUT = "study.json"
@@ -21,7 +21,7 @@ class Store:
 
     def __init__(self, folder: Path | None) -> None:
         self.folder = folder
-        self._results: dict[str, Result] = {}
+        self._results: dict[str, PointResult] = {}
 
     @staticmethod
     def open(folder: Path | str | None, scenario: str | None, names: Sequence[str]) -> "Store":
@@ -60,12 +60,12 @@ class Store:
                 raise SessionError(f"{text} is {found.get(name)!r}, not {value!r}")
         for path in self.folder.glob("*/*.json"):
             try:
-                result = Result.from_json(path.read_text("utf-8"))
+                result = PointResult.from_json(path.read_text("utf-8"))
             except (OSError, ValueError):
                 continue  # an incomplete file counts as missing
             self._results[result.name] = result
 
-    def result(self, point: Point) -> Result | None:
+    def result(self, point: Point) -> PointResult | None:
         """Result of a point; None if it is missing."""
         return self._results.get(point.name)
 
@@ -80,7 +80,7 @@ class Store:
             return "changed parameters"
         return "failed" if found.error else ""
 
-    def take(self, result: Result) -> None:
+    def take(self, result: PointResult) -> None:
         """Store a result.
 
         Raises:
@@ -91,7 +91,7 @@ class Store:
             write_result(self.folder, result)
 
 
-def write_result(folder: Path, result: Result) -> None:
+def write_result(folder: Path, result: PointResult) -> None:
     """Write a result completely or not at all; writing it again changes nothing.
 
     Raises:

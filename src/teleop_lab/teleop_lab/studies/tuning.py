@@ -10,7 +10,7 @@ import numpy as np
 
 from teleop_core.base.errors import ParameterError, SessionError, TeleopError
 from teleop_core.session import api, runner
-from teleop_lab.studies.point import Result
+from teleop_lab.studies.point import PointResult
 from teleop_lab.studies.store import Store
 from teleop_lab.studies.study import Study, common, is_number, named, read_entries
 from teleop_lab.studies.summary import least_difference
@@ -24,7 +24,7 @@ _ROUNDING = 1e-12
 """Relative difference of two means that is no difference."""
 
 
-class Range(NamedTuple):
+class SearchRange(NamedTuple):
     """Range in which a parameter is searched. If ``low`` and ``high`` are integers, only integers are tried.
 
     Attributes:
@@ -112,7 +112,7 @@ class Tuning:
 
     Attributes:
         scenario: One of ``teleop scenarios``; None for the defaults.
-        searched: A :class:`Range` or a list of choices for each parameter, named as on the command line.
+        searched: A :class:`SearchRange` or a list of choices for each parameter, named as on the command line.
         seeds: Seeds of the hands over which a score is averaged; values that suit only one hand are useless.
         metric: Key of the score, such as ``task.time_s``.
         is_largest: Whether the largest score is the best one.
@@ -124,7 +124,7 @@ class Tuning:
     """
 
     scenario: str | None
-    searched: Mapping[str, Range | Sequence[api.Setting]]
+    searched: Mapping[str, SearchRange | Sequence[api.Setting]]
     seeds: Sequence[int]
     metric: str
     is_largest: bool = False
@@ -135,9 +135,11 @@ class Tuning:
         if not self.searched:
             raise ParameterError("tune", {}, "at least one parameter")
         for name, where in self.searched.items():
-            if isinstance(where, Range) and not (math.isfinite(where.high - where.low) and where.low < where.high):
+            if isinstance(where, SearchRange) and not (
+                math.isfinite(where.high - where.low) and where.low < where.high
+            ):
                 raise ParameterError(f"tune of {name}", tuple(where[:2]), "low below high")
-            if isinstance(where, Range) and where.is_log and where.low <= 0.0:
+            if isinstance(where, SearchRange) and where.is_log and where.low <= 0.0:
                 raise ParameterError(f"low of {name}", where.low, "above 0 with log")
         study = self.study()
         for name, values in study.swept.items():  # each value separately, so that an error names its parameter
@@ -147,7 +149,9 @@ class Tuning:
 
     def study(self) -> Study:
         """Study over the lowest and highest values of all ranges; the search uses its store."""
-        ends = {name: where[:2] if isinstance(where, Range) else tuple(where) for name, where in self.searched.items()}
+        ends = {
+            name: where[:2] if isinstance(where, SearchRange) else tuple(where) for name, where in self.searched.items()
+        }
         return Study(self.scenario, ends, self.seeds, (self.metric,), self.settings, self.parts)
 
     def run(
@@ -199,7 +203,7 @@ class Tuning:
     def _values(self, trial: Any) -> dict[str, api.Setting]:
         found: dict[str, api.Setting] = {}
         for name, where in self.searched.items():
-            if not isinstance(where, Range):
+            if not isinstance(where, SearchRange):
                 # Optuna supports only plain values, so a list is represented by its index.
                 found[name] = where[trial.suggest_categorical(name, list(range(len(where))))]
             elif isinstance(where.low, int) and isinstance(where.high, int):
@@ -227,7 +231,7 @@ class Tuning:
             found.append(self._trial(values, [one for one in results if one is not None], why))
         return found
 
-    def _trial(self, values: dict[str, api.Setting], results: list[Result], error: str) -> Trial:
+    def _trial(self, values: dict[str, api.Setting], results: list[PointResult], error: str) -> Trial:
         found = [one.scores.get(self.metric) for one in results]
         error = error or next((one.error for one in results if one.error), "")
         if error or None in found:
@@ -258,14 +262,14 @@ def read_tuning(path: Path | str) -> Tuning:
     metrics = [(word, content[word]) for word in ("minimize", "maximize") if word in content]
     if len(metrics) != 1:
         raise ParameterError("minimize, maximize", dict(metrics), "one of them: key of a score")
-    searched: dict[str, Range | Sequence[api.Setting]] = {}
+    searched: dict[str, SearchRange | Sequence[api.Setting]] = {}
     for name, where in named(content, "tune").items():
         searched[name] = _range(name, where)
     ((word, metric),) = metrics
     return Tuning(searched=searched, metric=str(metric), is_largest=word == "maximize", **common(content, Path(path)))
 
 
-def _range(name: str, where: object) -> Range | Sequence[api.Setting]:
+def _range(name: str, where: object) -> SearchRange | Sequence[api.Setting]:
     if isinstance(where, list):
         return where
     hint = "a list of choices, or {low: 0.1, high: 1.0}, with log: true for equal ratios"
@@ -274,4 +278,4 @@ def _range(name: str, where: object) -> Range | Sequence[api.Setting]:
     low, high = where["low"], where["high"]
     if not all(isinstance(x, int | float) and not isinstance(x, bool) for x in (low, high)):
         raise ParameterError(f"tune of {name}", where, hint)
-    return Range(low, high, bool(where.get("log", False)))
+    return SearchRange(low, high, bool(where.get("log", False)))

@@ -11,7 +11,7 @@ from teleop_lab.studies.answers import UNTOLD, Quantity, parameters_of, score_of
 from teleop_lab.studies.study import SEED, is_number
 from teleop_lab.studies.study_page import seed_boxes
 from teleop_lab.studies.summary import mean_of
-from teleop_lab.studies.tuning import Range
+from teleop_lab.studies.tuning import SearchRange
 
 if TYPE_CHECKING:
     from teleop_lab.studies.tuning import Trial, Tuned, Tuning
@@ -60,7 +60,7 @@ def _short(value: Any) -> Any:
 
 def _boxes(tuning: "Tuning", name: str, one: Quantity) -> list[Cell]:
     where = tuning.searched[name]
-    if isinstance(where, Range):
+    if isinstance(where, SearchRange):
         return [Cell(f"{one.text(where.low)} to {one.text(where.high)}{', equal ratios' * where.is_log}")]
     return [Cell(one.text(value)) for value in where]
 
@@ -81,7 +81,7 @@ def _figures(tuning: "Tuning", tuned: "Tuned", score: Quantity) -> Iterator[Figu
             trace = intervals(np.empty(0), means, told, color, score.unit)
             traces.append(trace | {"mode": "markers", "x": x, "showlegend": True})
         where = tuning.searched[name]
-        is_log = isinstance(where, Range) and where.is_log
+        is_log = isinstance(where, SearchRange) and where.is_log
         kind = {"type": "log", "tickvals": [n * 10.0**e for e in range(-9, 10) for n in (1, 2, 5)]} if is_log else {}
         layout = {"xaxis": axis(one.title, one.unit, **kind), "yaxis": axis(score.title, score.unit)}
         yield Figure(f"{score.title} over {one.title}", one.meaning, traces, layout, 320)

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 from teleop_core.base.errors import SessionError
 from teleop_core.base.own_parts import forget_own_parts, load_own_parts, named_files
 from teleop_core.base.workers import workers
-from teleop_lab.studies.point import Point, Result, code_digest, compute
+from teleop_lab.studies.point import Point, PointResult, code_digest, compute
 from teleop_lab.studies.store import write_result
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ def in_processes(
     jobs: int | None,
     store: Path | None,
     recordings: Path | str | None = None,
-) -> Iterator[Result]:
+) -> Iterator[PointResult]:
     """Yield results as they are computed by processes of this machine, each with one session at a time.
 
     The process that computes a result writes it. If a process dies, the sessions that were running are repeated.
@@ -64,11 +64,11 @@ def in_processes(
                 raise SessionError(f"{text} below `if __name__ == '__main__':`, in a file") from None
         return
     for point in left.values():
-        yield Result(point.name, point.key, {}, f"its process died {_TRIES} times", 0.0)
+        yield PointResult(point.name, point.key, {}, f"its process died {_TRIES} times", 0.0)
 
 
-def _as_they_come(pool: Executor, do: "partial[Result]", points: list[Point], most: int) -> Iterator[Result]:
-    waiting: set[Future[Result]] = set()
+def _as_they_come(pool: Executor, do: "partial[PointResult]", points: list[Point], most: int) -> Iterator[PointResult]:
+    waiting: set[Future[PointResult]] = set()
     rest = iter(points)
     while True:
         while len(waiting) < most and (point := next(rest, None)) is not None:
@@ -80,7 +80,7 @@ def _as_they_come(pool: Executor, do: "partial[Result]", points: list[Point], mo
             yield future.result()
 
 
-def _computed(point: Point, metrics: tuple[str, ...], store: Path | None, recordings: Path | None) -> Result:
+def _computed(point: Point, metrics: tuple[str, ...], store: Path | None, recordings: Path | None) -> PointResult:
     result = compute(point, metrics, recordings)
     if store is not None:
         write_result(store, result)
@@ -89,7 +89,7 @@ def _computed(point: Point, metrics: tuple[str, ...], store: Path | None, record
 
 def on_dask(
     client: "Client", points: Sequence[Point], metrics: Sequence[str], parts: Sequence[Path]
-) -> Iterator[Result]:
+) -> Iterator[PointResult]:
     """Yield results as they are computed by the workers of a Dask cluster, which share no folder with this machine.
 
     Raises:
@@ -125,7 +125,7 @@ def on_dask(
                 raised = future.exception()
                 text = f"{type(raised).__name__}: {' '.join(str(raised).split())}"
                 for point in batch:
-                    yield Result(point.name, point.key, {}, text, 0.0)
+                    yield PointResult(point.name, point.key, {}, text, 0.0)
             future.release()
     finally:
         client.cancel(list(futures))
@@ -139,7 +139,7 @@ def _codes(client: "Client", own: str) -> tuple[list[str], dict[str, object]]:
 
 def _batch(
     points: Sequence[Point], metrics: tuple[str, ...], parts: tuple[tuple[str, str], ...], code: str
-) -> list[Result]:
+) -> list[PointResult]:
     """Results of some points on a worker; parts of a user travel as texts.
 
     Raises:

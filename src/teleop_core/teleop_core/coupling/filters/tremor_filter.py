@@ -50,7 +50,7 @@ class FilterState(plausibility.PlausibilityState):
     is_other: int
 
 
-class Part(NamedTuple):
+class FilterPart(NamedTuple):
     """The filter of the kind, its numbers, and its memory for each coordinate (3, 32)."""
 
     filter: Any
@@ -70,7 +70,7 @@ def _begin(s: FilterState, memory: Array, pose: Array, filtered: Array) -> None:
 
 
 @inner
-def _filter(s: FilterState, part: Part, i: int, value: float, elapsed_ns: int) -> float:
+def _filter(s: FilterState, part: FilterPart, i: int, value: float, elapsed_ns: int) -> float:
     """Filtered value of a coordinate; a long period is split, with linear interpolation of the values."""
     pieces = 1 + (elapsed_ns - 1) // LONGEST_NS
     period = 1e-9 * elapsed_ns / pieces
@@ -101,7 +101,7 @@ def _fade(s: FilterState, period: float, filtered: Array) -> None:
 
 
 @inner
-def _follow(s: FilterState, part: Part, pose: Array, elapsed_ns: int, filtered: Array) -> None:
+def _follow(s: FilterState, part: FilterPart, pose: Array, elapsed_ns: int, filtered: Array) -> None:
     """Write the filtered position of a sample that is not the first."""
     if s.is_other > 0:
         _begin(s, part.memory, pose, filtered)
@@ -113,7 +113,7 @@ def _follow(s: FilterState, part: Part, pose: Array, elapsed_ns: int, filtered: 
 
 
 @kernel
-def tremor_filter_step(p: FilterRecord, s: FilterState, part: Part, row: Row, dt: float) -> None:
+def tremor_filter_step(p: FilterRecord, s: FilterState, part: FilterPart, row: Row, dt: float) -> None:
     """One master sample: write master_filtered_cp and master_filtered_out.
 
     The position is filtered coordinate by coordinate, over the time between stamps; the orientation passes unchanged.
@@ -124,7 +124,7 @@ def tremor_filter_step(p: FilterRecord, s: FilterState, part: Part, row: Row, dt
     Args:
         p: Parameter record.
         s: State record; written.
-        part: :class:`Part`; its memory is written.
+        part: :class:`FilterPart`; its memory is written.
         row: Signals.
         dt: Tick [s].
     """
@@ -152,7 +152,7 @@ class RunningTremorFilter(RunningStage):
         super().__init__(TREMOR_FILTER, 0, dt)
         self.parameters, self.state = record(FilterRecord), record(FilterState)
         self.kernel = tremor_filter_step
-        self._part = Part(None, np.empty(0), np.zeros((3, MEMORY)))
+        self._part = FilterPart(None, np.empty(0), np.zeros((3, MEMORY)))
         self._begin = self.signals.copy()
         self.retune(parameters)
         self.reset()
@@ -174,7 +174,7 @@ class RunningTremorFilter(RunningStage):
             self.state["is_retuned"] |= not np.array_equal(numbers, self._part.numbers)
             self._part.numbers[:] = numbers  # in place, so that the composed tick stays valid
             return
-        self._part = Part(step, numbers, self._part.memory)
+        self._part = FilterPart(step, numbers, self._part.memory)
         self.arguments = (self.parameters, self.state, self._part)
         self._bound = None
         self.state["is_retuned"] = self.state["is_other"] = 1

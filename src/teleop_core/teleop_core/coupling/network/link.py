@@ -51,7 +51,7 @@ class LinkState(Fields):
     waits: _BothWays  # number of waiting packets
 
 
-class Way(NamedTuple):
+class Direction(NamedTuple):
     """One direction: its draw kernel, the contents of a packet, and the calendar of due packets."""
 
     draw: Any
@@ -79,10 +79,10 @@ class Way(NamedTuple):
             array[...] = 0
 
 
-def make_way(width: int, sizes: Array, draw: Any, numbers: Array) -> Way:
+def make_way(width: int, sizes: Array, draw: Any, numbers: Array) -> Direction:
     """Make a direction whose packets have ``width`` numbers, of topics with message sizes ``sizes`` (K,)."""
     topics = len(sizes)
-    return Way(
+    return Direction(
         draw=draw, numbers=numbers, memory=np.zeros(MEMORY), chances=np.zeros((BLOCK, CHANCES + 1)),
         packet=np.zeros(width), packet_ns=np.zeros(topics, np.int64),
         came=np.zeros(width), came_ns=np.zeros(topics, np.int64),
@@ -101,7 +101,7 @@ def may_send(p: LinkRecord, s: LinkState, k: int) -> bool:
 
 
 @inner
-def _due(p: LinkRecord, s: LinkState, way: Way, k: int, dt: float) -> int:
+def _due(p: LinkRecord, s: LinkState, way: Direction, k: int, dt: float) -> int:
     """Arrival tick of the packet whose transmission ends at ``s.free``; 0 if the packet is lost."""
     chances = way.chances[s.next]
     drawn = way.draw(way.numbers, way.memory, chances[:CHANCES], s.tick * dt)
@@ -118,7 +118,7 @@ def _due(p: LinkRecord, s: LinkState, way: Way, k: int, dt: float) -> int:
 
 
 @inner
-def _packet_bytes(way: Way) -> float:
+def _packet_bytes(way: Direction) -> float:
     """Bytes of ``way.packet``; a topic that has not been written yet does not count."""
     size = float(packet_size.HEADER)
     for i in range(way.sizes.shape[0]):
@@ -128,14 +128,14 @@ def _packet_bytes(way: Way) -> float:
 
 
 @inner
-def send_packet(p: LinkRecord, s: LinkState, way: Way, k: int, dt: float) -> None:
+def send_packet(p: LinkRecord, s: LinkState, way: Direction, k: int, dt: float) -> None:
     """Send ``way.packet`` with the motion in ``way.moved[0]``; arguments as in :func:`serve_line`."""
     queue_packet(p, s, way, k)
     serve_line(p, s, way, k, dt)
 
 
 @inner
-def queue_packet(p: LinkRecord, s: LinkState, way: Way, k: int) -> None:
+def queue_packet(p: LinkRecord, s: LinkState, way: Direction, k: int) -> None:
     """Put ``way.packet`` into the queue of the line.
 
     If the queue is full, its oldest packet is lost. If the order of packets is kept, the new packet is lost instead.
@@ -176,7 +176,7 @@ def _leave_queue(s: LinkState, k: int) -> None:
 
 
 @inner
-def serve_line(p: LinkRecord, s: LinkState, way: Way, k: int, dt: float) -> None:
+def serve_line(p: LinkRecord, s: LinkState, way: Direction, k: int, dt: float) -> None:
     """Begin the transmission of waiting packets while the line is free.
 
     Args:
@@ -194,7 +194,7 @@ def serve_line(p: LinkRecord, s: LinkState, way: Way, k: int, dt: float) -> None
 
 
 @inner
-def transmit(p: LinkRecord, s: LinkState, way: Way, k: int, dt: float) -> int:
+def transmit(p: LinkRecord, s: LinkState, way: Direction, k: int, dt: float) -> int:
     """Transmit the packet that has waited longest; returns the tick of its arrival, or 0 if it is lost.
 
     Arguments as in :func:`serve_line`.
@@ -208,7 +208,7 @@ def transmit(p: LinkRecord, s: LinkState, way: Way, k: int, dt: float) -> int:
 
 
 @inner
-def _put_in_calendar(way: Way, waiting: int, due: int) -> None:
+def _put_in_calendar(way: Direction, waiting: int, due: int) -> None:
     """Put the packet at index ``waiting`` of the queue into the calendar, at the tick ``due``."""
     width, topics = way.packet.shape[0], way.packet_ns.shape[0]
     at = due % LONGEST
@@ -226,7 +226,7 @@ def _put_in_calendar(way: Way, waiting: int, due: int) -> None:
 
 
 @inner
-def take_packet(s: LinkState, way: Way, k: int) -> None:
+def take_packet(s: LinkState, way: Direction, k: int) -> None:
     """Take the packets that are due now; write the newest into ``way.came``, and whether it is new into ``s.arrived``.
 
     ``way.moved[1]`` gets the summed motion of all due packets, including overtaken packets.

@@ -112,7 +112,7 @@ def _as_stamped_there(p: NetworkRecord, s: NetworkState, stamp_ns: int) -> int:
 
 
 @inner
-def _send_there(p: NetworkRecord, s: NetworkState, there: link.Way, row: Row, dt: float) -> None:
+def _send_there(p: NetworkRecord, s: NetworkState, there: link.Direction, row: Row, dt: float) -> None:
     """Send the command if it is new, and if the master's side has received a pose of the slave."""
     is_new = row.slave_servo_cp_ns not in (0, s.sent_ns)
     if not (is_new and s.newest[BACK] > 0 and link.may_send(p, s, THERE)):
@@ -136,7 +136,7 @@ def _send_there(p: NetworkRecord, s: NetworkState, there: link.Way, row: Row, dt
 
 
 @inner
-def _send_back(p: NetworkRecord, s: NetworkState, back: link.Way, row: Row, dt: float) -> None:
+def _send_back(p: NetworkRecord, s: NetworkState, back: link.Direction, row: Row, dt: float) -> None:
     """Send the slave's values as soon as there are values."""
     if row.slave_setpoint_cp_ns == 0 or not link.may_send(p, s, BACK):
         return
@@ -158,7 +158,7 @@ def _send_back(p: NetworkRecord, s: NetworkState, back: link.Way, row: Row, dt: 
 
 
 @inner
-def _take_there(p: NetworkRecord, s: NetworkState, there: link.Way, row: Row) -> None:
+def _take_there(p: NetworkRecord, s: NetworkState, there: link.Direction, row: Row) -> None:
     """Take the command that arrived; increments are added to the slave's setpoint, or to its last command."""
     link.take_packet(s, there, THERE)
     if s.arrived[THERE]:
@@ -180,7 +180,7 @@ def _take_there(p: NetworkRecord, s: NetworkState, there: link.Way, row: Row) ->
 
 
 @inner
-def _take_back(s: NetworkState, back: link.Way, row: Row) -> None:
+def _take_back(s: NetworkState, back: link.Direction, row: Row) -> None:
     link.take_packet(s, back, BACK)
     if s.arrived[BACK] == 0:
         return
@@ -195,14 +195,16 @@ def _take_back(s: NetworkState, back: link.Way, row: Row) -> None:
 
 
 @kernel
-def network_step(p: NetworkRecord, s: NetworkState, there: link.Way, back: link.Way, row: Row, dt: float) -> None:
+def network_step(
+    p: NetworkRecord, s: NetworkState, there: link.Direction, back: link.Direction, row: Row, dt: float
+) -> None:
     """One tick: send the new values of each side, and write the values that arrive at the other side.
 
     Args:
         p: Parameter record.
         s: State record; written.
-        there: :class:`~teleop_core.coupling.network.link.Way` to the slave; written.
-        back: :class:`~teleop_core.coupling.network.link.Way` from the slave; written.
+        there: :class:`~teleop_core.coupling.network.link.Direction` to the slave; written.
+        back: :class:`~teleop_core.coupling.network.link.Direction` from the slave; written.
         row: Signals.
         dt: Tick [s].
     """
@@ -245,7 +247,7 @@ class NetworkLink(RunningStage):
         self.reset()
 
     @staticmethod
-    def _made(width: int, topics: tuple[Topic, ...], given: WayParameters) -> link.Way:
+    def _made(width: int, topics: tuple[Topic, ...], given: WayParameters) -> link.Direction:
         kind = NETWORKS.find(given.kind.kind)
         numbers = kind.numbers(given.kind.parameters)
         return link.make_way(width, packet_size.message_sizes(topics), kind.draw_pointer, numbers)

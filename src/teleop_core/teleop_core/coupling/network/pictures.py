@@ -14,7 +14,9 @@ from teleop_core.kernels import Integers, kernel, record
 
 
 @kernel
-def carry(p: NetworkRecord, s: NetworkState, way: link.Way, size: int, ticks: int, due: Integers, dt: float) -> None:
+def carry(
+    p: NetworkRecord, s: NetworkState, way: link.Direction, size: int, ticks: int, due: Integers, dt: float
+) -> None:
     """Send a picture in the present tick, and let time pass.
 
     Args:

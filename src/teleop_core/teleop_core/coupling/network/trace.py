@@ -17,7 +17,7 @@ _SLOW = 20.0  # largest interval of rows [s]; with a longer one the network woul
 
 
 @dataclass(frozen=True, kw_only=True)
-class TraceParameters:
+class DelayTraceParameters:
     """A recording of delays."""
 
     file: str = parameter(
@@ -76,7 +76,7 @@ def _row(path: str, number: int, line: list[str], before: float) -> tuple[float,
     return time, delay
 
 
-def trace_numbers(parameters: TraceParameters) -> Array:
+def trace_numbers(parameters: DelayTraceParameters) -> Array:
     """Numbers of the file; without a file, the numbers of a network without delay."""
     return read_trace(parameters.file) if parameters.file else np.array([0.0, 0.0, 1.0, 0.0])
 
@@ -99,4 +99,4 @@ def trace_draw(numbers: Array, memory: Array, chances: Array, now: float) -> flo
     return numbers[2 * at + 1]
 
 
-TRACE = Network("trace", TraceParameters, trace_draw, trace_numbers)
+TRACE = Network("trace", DelayTraceParameters, trace_draw, trace_numbers)

@@ -73,7 +73,7 @@ class PassivityParameters:
     )
 
 
-class Laws(NamedTuple):
+class PassivityLaws(NamedTuple):
     """The slave's side of all kinds, and their memory."""
 
     slaves: Any
@@ -96,7 +96,7 @@ class PortState(Fields):
 
 
 @inner
-def _observe(s: PortState, laws: Laws, row: Row, port: Array) -> None:
+def _observe(s: PortState, laws: PassivityLaws, row: Row, port: Array) -> None:
     """Count the energy through the tip since its last measurement.
 
     The force is the mean of the measured forces at start and end of the motion, so that a spring takes and returns
@@ -124,7 +124,7 @@ def _observe(s: PortState, laws: Laws, row: Row, port: Array) -> None:
 
 
 @inner
-def _begin(s: PortState, laws: Laws, heard: Array, port: Array) -> None:
+def _begin(s: PortState, laws: PassivityLaws, heard: Array, port: Array) -> None:
     """Begin the round that the hand's side announces, without any drift."""
     begin_round(port, heard[LAW], heard[ROUND])
     for i in range(laws.memory.shape[0]):
@@ -135,13 +135,13 @@ def _begin(s: PortState, laws: Laws, heard: Array, port: Array) -> None:
 
 
 @kernel
-def passivity_step(p: Fields, s: PortState, laws: Laws, row: Row, dt: float) -> None:
+def passivity_step(p: Fields, s: PortState, laws: PassivityLaws, row: Row, dt: float) -> None:
     """One tick: count the energy at the tip, and process a command that has arrived.
 
     Args:
         p: Not used.
         s: State record; written.
-        laws: :class:`Laws`; written.
+        laws: :class:`PassivityLaws`; written.
         row: Signals; ``slave_energy`` and ``passivity_servo_cp`` are written.
         dt: Tick [s].
     """
@@ -177,7 +177,7 @@ class SlaveSide(RunningStage):
         self.parameters, self.state = records([("none", "i8")])[0], record(PortState)
         self.kernel = passivity_step
         slaves = tuple(PASSIVITIES.find(name).slave_pointer for name in PASSIVITIES)
-        self._laws = Laws(slaves, np.zeros(7), np.zeros(MEMORY), np.zeros(3), np.zeros(7))
+        self._laws = PassivityLaws(slaves, np.zeros(7), np.zeros(MEMORY), np.zeros(3), np.zeros(7))
         self.arguments = (self.parameters, self.state, self._laws)
         self._start = self.signals.copy()
         self.retune(parameters)

@@ -5,7 +5,7 @@ from itertools import cycle
 import numpy as np
 
 from teleop_core.evaluation import MISSING, Context, Key, Metric, TableRow, Window, fixed, number, same_stamp
-from teleop_core.evaluation.accumulators import Delay, Distribution, Integers
+from teleop_core.evaluation.accumulators import DelaySpread, Distribution, Integers
 from teleop_core.evaluation.figure import DARK, FIRST, SECOND, THIRD, Figure, line
 from teleop_core.evaluation.pairing import NONE
 from teleop_core.graph.topics import NETWORK_SERVO_CP, Topic
@@ -60,13 +60,13 @@ class LatencyMetric(Metric):
         is_command = same_stamp(stamps, window.around(self._command).stamp_ns) != NONE
         self._delays[TOTAL].add((logs - stamps)[is_command])
 
-    def values(self) -> dict[str, Delay]:
+    def values(self) -> dict[str, DelaySpread]:
         """Delay of each stage, and the configured delay if there is one."""
         found = {stage: distribution.delay() for stage, distribution in self._delays.items()}
-        own = found.get(self._network, Delay(0.0, 0.0, 0.0))
+        own = found.get(self._network, DelaySpread(0.0, 0.0, 0.0))
         parts = (own.median, own.p99, own.max)
         if any(parts) or self._asked_ms:
-            found[ASKED] = Delay(*(None if p is None else p + self._asked_ms for p in parts))
+            found[ASKED] = DelaySpread(*(None if p is None else p + self._asked_ms for p in parts))
         return found
 
     def rows(self) -> list[TableRow]:
@@ -130,7 +130,7 @@ def _bin_width(delays: list[Distribution]) -> int:
     return max(1, -(-max(spans) // _BINS))
 
 
-def _sentence(total: Delay) -> str:
+def _sentence(total: DelaySpread) -> str:
     return (
         f"From the sample of the hand to the slave's setpoint: {number(total.median)} ms median, "
         f"{number(total.p99)} ms for 99 of 100. Other lines: what each stage adds. "

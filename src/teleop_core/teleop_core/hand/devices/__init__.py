@@ -3,6 +3,6 @@
 This package can be imported without their libraries, which are the extra ``devices``.
 """
 
-from teleop_core.hand.input_device import NOTHING, Device, Reading
+from teleop_core.hand.input_device import NOTHING, Device, DeviceReading
 
-__all__ = ["NOTHING", "Device", "Reading"]
+__all__ = ["NOTHING", "Device", "DeviceReading"]

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from teleop_core.base import SessionError, Within, fixed
-from teleop_core.hand.devices import Reading, pilot
+from teleop_core.hand.devices import DeviceReading, pilot
 from teleop_core.hand.operators import Operator
 from teleop_core.hand.operators.remote import AHEAD, make_remote
 
@@ -91,7 +91,7 @@ class Gamepad:
         called = f" with {wanted!r} in its name" if wanted else ""
         raise SessionError(f"no gamepad{called}; found: {', '.join(texts) or 'none'}")
 
-    def read(self) -> Reading:
+    def read(self) -> DeviceReading:
         """Return the present reading; raises SessionError if the gamepad is disconnected."""
         self._sdl.pygame.event.pump()
         self._sdl.pygame.event.clear()
@@ -110,7 +110,7 @@ class Gamepad:
             ]
         )
         shoulders = pad.CONTROLLER_BUTTON_LEFTSHOULDER, pad.CONTROLLER_BUTTON_RIGHTSHOULDER
-        return Reading(
+        return DeviceReading(
             rates,
             any(map(button, shoulders)),
             button(pad.CONTROLLER_BUTTON_A),

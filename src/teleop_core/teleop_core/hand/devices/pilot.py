@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from teleop_core.base import Within, fixed
-from teleop_core.hand.devices import Reading
+from teleop_core.hand.devices import DeviceReading
 from teleop_core.hand.operators.remote import RemoteHand
 from teleop_core.kernels import Array, length, turn_by
 
@@ -71,7 +71,7 @@ class Pilot:
         self._pose: Array | None = None
         self._has_buttons, self._leads_jaw = (False, False), True
 
-    def step(self, reading: Reading, dt: float) -> None:
+    def step(self, reading: DeviceReading, dt: float) -> None:
         """Take a reading of the device, ``dt`` [s] after the last one."""
         self._press(reading)
         self._close(reading)
@@ -95,7 +95,7 @@ class Pilot:
         self.let_go()
         self._leads_jaw = False
 
-    def _close(self, reading: Reading) -> None:
+    def _close(self, reading: DeviceReading) -> None:
         """Close the jaw by the share by which the device's trigger is pressed.
 
         A device that was reconnected reports an unpressed trigger. It moves the jaw again only after the trigger was
@@ -107,7 +107,7 @@ class Pilot:
         if self._leads_jaw:
             self._hand.close(reading.jaw)
 
-    def _press(self, reading: Reading) -> None:
+    def _press(self, reading: DeviceReading) -> None:
         pressed = reading.fixture, reading.mode
         for name, now, before in zip(("fixture", "mode"), pressed, self._has_buttons, strict=True):
             if now is not before:

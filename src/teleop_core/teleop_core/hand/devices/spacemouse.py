@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from teleop_core.base.errors import SessionError
-from teleop_core.hand.devices import Reading, pilot
+from teleop_core.hand.devices import DeviceReading, pilot
 from teleop_core.hand.operators import Operator
 from teleop_core.hand.operators.remote import AHEAD, make_remote
 from teleop_core.kernels.geometry import Array
@@ -96,7 +96,7 @@ class SpaceMouse:
             raise SessionError(text) from error
         self._touched = self._heard = -np.inf
 
-    def read(self) -> Reading:
+    def read(self) -> DeviceReading:
         """Return the present reading; raises SessionError if the mouse is disconnected."""
         now = time.monotonic()
         try:
@@ -111,7 +111,7 @@ class SpaceMouse:
         if np.abs(rates).max() > self._dead_zone:
             self._touched = now
         pressed = self._reports.buttons
-        return Reading(rates, now - self._touched < _REST, bool(pressed & 1), bool(pressed & 2))
+        return DeviceReading(rates, now - self._touched < _REST, bool(pressed & 1), bool(pressed & 2))
 
     def rumble(self, share: float) -> None:
         """Do nothing: the mouse has no motor."""

@@ -10,7 +10,7 @@ _NUMBER, _TAKEN, _RETURNED, _FRICTION = (
 )
 
 
-class ContactState(Fields):
+class HandContactState(Fields):
     """Fields of a state record with the present contact."""
 
     tip: Vector3  # last position of the tip of the stylus [m]
@@ -18,7 +18,7 @@ class ContactState(Fields):
 
 
 @inner
-def account(s: ContactState, force: Array, friction: float, moved: float, place: Array, contact: Array) -> None:
+def account(s: HandContactState, force: Array, friction: float, moved: float, place: Array, contact: Array) -> None:
     """Add the energy of a tick to the present contact; a new contact begins when the force becomes nonzero.
 
     The force is constant within a tick, so force times displacement of the device is exactly its work. The wall takes

@@ -75,7 +75,7 @@ def derive(p: MasterRecord, parameters: HapticMasterParameters, dt: float) -> No
     p.half[:] = 0.5 * np.array(device.workspace)
 
 
-class MasterState(hand_mechanics.HandState, ReadingState, rendering.RenderingState, contact.ContactState):
+class MasterState(hand_mechanics.HandState, ReadingState, rendering.RenderingState, contact.HandContactState):
     """State record of the haptic master."""
 
     next_noise: int

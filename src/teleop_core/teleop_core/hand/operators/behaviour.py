@@ -14,7 +14,7 @@ PRESS_TIME = 0.1
 
 
 @dataclass(frozen=True, kw_only=True)
-class ButtonParameters:
+class PressParameters:
     """Times at which the operator uses the buttons [s]; each press of fixture or mode lasts 0.1 s."""
 
     clutch: tuple[float, ...] = fixed(
@@ -124,7 +124,7 @@ class OperatorParameters:
         "middle of the tremor's band, which is ±2 Hz",
         source="published: physiological tremor has 8 to 12 Hz (Elble and Koller 1990)",
     )
-    buttons: ButtonParameters = field(default_factory=ButtonParameters)
+    buttons: PressParameters = field(default_factory=PressParameters)
     device: RoomParameters = field(default_factory=RoomParameters)
 
     def __post_init__(self) -> None:

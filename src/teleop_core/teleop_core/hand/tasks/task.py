@@ -29,7 +29,7 @@ class TaskState(Fields):
     begin_ns: int
 
 
-class Part(NamedTuple):
+class TaskPart(NamedTuple):
     """The task's judge, its numbers, its memory (64,) and its scene."""
 
     judge: Any
@@ -39,13 +39,13 @@ class Part(NamedTuple):
 
 
 @kernel
-def task_step(p: TaskState, s: TaskState, part: Part, row: Row, dt: float) -> None:
+def task_step(p: TaskState, s: TaskState, part: TaskPart, row: Row, dt: float) -> None:
     """One tick: call the task's judge with the scene, once the slave follows; the judge writes task_state.
 
     Args:
         p: Not used.
         s: State record; written.
-        part: :class:`Part`; memory and scene are written.
+        part: :class:`TaskPart`; memory and scene are written.
         row: Signals.
         dt: Tick [s].
     """
@@ -79,7 +79,7 @@ class RunningTask(RunningStage):
         self.kernel = task_step
         kind = TASKS.find(parameters.kind.kind)
         numbers = kind.numbers(parameters.kind.parameters)
-        self._part = Part(kind.judge_pointer, numbers, np.zeros(MEMORY), np.zeros(len(SCENE)))
+        self._part = TaskPart(kind.judge_pointer, numbers, np.zeros(MEMORY), np.zeros(len(SCENE)))
         self.arguments = (record(TaskState), self.state, self._part)
         self._begin = self.signals.copy()
         self.reset()

@@ -29,7 +29,7 @@ def parts_parameter(default: tuple[str, ...], doc: str) -> Any:
     return parameter(default, doc=f"{doc}; not before it: what is outside of that shape")
 
 
-class Part(NamedTuple):
+class ShapePart(NamedTuple):
     """A part of a shape.
 
     Attributes:
@@ -45,7 +45,7 @@ class Part(NamedTuple):
     at: Array
 
 
-def parts_of(texts: tuple[str, ...], name: str) -> list[Part]:
+def parts_of(texts: tuple[str, ...], name: str) -> list[ShapePart]:
     """Parts that texts describe.
 
     Args:
@@ -61,7 +61,7 @@ def parts_of(texts: tuple[str, ...], name: str) -> list[Part]:
     return [_part(text, f"{name}[{i}]") for i, text in enumerate(texts)]
 
 
-def _part(text: str, name: str) -> Part:
+def _part(text: str, name: str) -> ShapePart:
     kind, _, rest = text.strip().removeprefix(_NOT).strip().partition(" ")
     if kind not in PARTS:
         raise ParameterError(name, text, f"a text that begins with one of {', '.join(PARTS)}")
@@ -72,7 +72,7 @@ def _part(text: str, name: str) -> Part:
     if not isinstance(at, tuple) or len(at) != 3 or not np.isfinite(at).all():
         raise ParameterError(f"{name} at", at, "x, y, z of the part's middle [m]")
     found, side = SHAPES.find(kind), -1.0 if text.strip().startswith(_NOT) else 1.0
-    return Part(found, build(found.parameters, values, f"{name} "), side, np.array(at, np.float64))
+    return ShapePart(found, build(found.parameters, values, f"{name} "), side, np.array(at, np.float64))
 
 
 def _value(text: str, name: str) -> str | float | tuple[float, ...]:

@@ -15,7 +15,7 @@ from teleop_core.base.registry import Registry, part_check, places, tried
 from teleop_core.kernels.addresses import Addressed
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots.robot import Robot
-from teleop_core.slave.arm import SimulatedArm
+from teleop_core.slave.arm import ArmParts
 
 __all__ = ["PLANTS", "Mover", "Physics", "Plant", "register_plant"]
 
@@ -87,7 +87,7 @@ class Mover(Protocol):
     """Simulator of others that moves an arm in place of our own equations of motion.
 
     In each tick of the arm, ``see`` is called first and ``move`` last. The kernels of both exchange values with the
-    arrays of the :class:`~teleop_core.slave.arm.SimulatedArm` and the signals for which the mover was made.
+    arrays of the :class:`~teleop_core.slave.arm.ArmParts` and the signals for which the mover was made.
 
     Attributes:
         see: Writes joint positions and speeds of the present moment, ``slave_true_cf``, and with servos the efforts.
@@ -124,7 +124,7 @@ class Plant:
     name: str
     parameters: type
     physics: Callable[[Any, Robot], Physics]
-    mover: Callable[[Any, Robot, SimulatedArm, Any, float], Mover] | None = None
+    mover: Callable[[Any, Robot, ArmParts, Any, float], Mover] | None = None
 
 
 def _try(part: Plant) -> None:

@@ -16,7 +16,7 @@ import numpy as np
 from teleop_core.kernels import Array, PerJoint, Vector3, inner
 from teleop_core.kernels.room import room
 from teleop_core.shapes.basis.directions import NEAR, make_unit
-from teleop_core.slave.arm import SimulatedArm
+from teleop_core.slave.arm import ArmParts
 from teleop_core.slave.world.button import ButtonRecord, ButtonState, follow_button, push_of_button
 from teleop_core.slave.world.puncture import PunctureRecord, PunctureState, follow_channel, puncture, push_in_channel
 
@@ -143,7 +143,7 @@ def _lay_flat(s: ContactState) -> None:
 
 
 @inner
-def _begin_at(s: ContactState, arm: SimulatedArm, lever: Array, q: Array, dq: Array, speed: Array) -> None:
+def _begin_at(s: ContactState, arm: ArmParts, lever: Array, q: Array, dq: Array, speed: Array) -> None:
     """Store surface and Jacobian of the tick at the point of contact, which is ``lever`` (3,) off the tip.
 
     Writes the speed (3,) of that point.
@@ -173,14 +173,7 @@ def _keep_bend(p: WorldRecord, s: ContactState, force: Array) -> None:
 
 @inner
 def _touch_at(
-    p: WorldRecord,
-    s: ContactState,
-    arm: SimulatedArm,
-    has_jacobian: bool,
-    lever: Array,
-    q: Array,
-    dq: Array,
-    force: Array,
+    p: WorldRecord, s: ContactState, arm: ArmParts, has_jacobian: bool, lever: Array, q: Array, dq: Array, force: Array
 ) -> bool:
     """Find the position of one point relative to the object, and write the push on it (3,) [N].
 
@@ -226,7 +219,7 @@ def _touch_at(
 
 
 @inner
-def touch(p: WorldRecord, contacts: Any, arm: SimulatedArm, q: Array, dq: Array, felt: Array) -> None:
+def touch(p: WorldRecord, contacts: Any, arm: ArmParts, q: Array, dq: Array, felt: Array) -> None:
     """Find the position of the tool relative to the object, and write the wrench on its tip (6,) [N, N·m].
 
     The points are balls of the tool's radius. They lie evenly along its axis, which is z of the

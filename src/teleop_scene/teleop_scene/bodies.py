@@ -19,7 +19,7 @@ from teleop_scene.parameters import SceneParameters
 from teleop_scene.scene import SceneState, address_of, shared
 
 
-class WorldState(Fields):
+class SceneBodiesState(Fields):
     """State record of the stage."""
 
     ticks: int
@@ -31,7 +31,7 @@ class WorldState(Fields):
     upper: float  # [rad]
 
 
-class WorldRow(Row):
+class SceneBodiesRow(Row):
     """Signals of the stage."""
 
     scene_poses: Array
@@ -41,11 +41,11 @@ class WorldRow(Row):
 @kernel
 def world_step(
     s: SceneState,
-    own: WorldState,
+    own: SceneBodiesState,
     bodies: Integers,
     arrays: tuple[Array, Array, Array, Array],
     jaw: tuple[Integers, Array, Array, Array],
-    row: WorldRow,
+    row: SceneBodiesRow,
     dt: float,
 ) -> None:
     """One tick: command the jaw, report its angle, and now and then the poses of the bodies.
@@ -85,11 +85,11 @@ def world_step(
 
 
 @kernel
-def rest(row: WorldRow, dt: float) -> None:
+def rest(row: SceneBodiesRow, dt: float) -> None:
     """One tick of a stage without a scene: nothing moves."""
 
 
-class World(RunningStage):
+class SceneBodies(RunningStage):
     """Stage of the bodies of a scene; with a robot that is no arm of a scene it does nothing.
 
     Raises:
@@ -99,7 +99,7 @@ class World(RunningStage):
     def __init__(self, stage: Stage, parameters: SceneParameters, dt: float) -> None:
         robot = load_robot_set(parameters.robot, parameters.geometry)
         super().__init__(stage, robot.n, dt)
-        self._row, self.state, self.robot = self.signals.copy(), record(WorldState), robot
+        self._row, self.state, self.robot = self.signals.copy(), record(SceneBodiesState), robot
         if not isinstance(robot, SceneRobot):
             self.scene, self.kernel = None, rest
             return
