@@ -5,11 +5,13 @@ import os
 import subprocess
 import sys
 from collections import Counter
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from teleop_core.base.workers import apart
 from teleop_core.graph.operation import State
 from teleop_core.nodes.crews import Processes
 from teleop_core.nodes.operation import StopInput
@@ -144,3 +146,9 @@ def test_no_schedules_are_refused_and_start_no_session(count: str, teleop_again:
     done = teleop_again("drill", "--seeds", count, code=2)
     assert not done.stdout
     assert f"--seeds is {count}, must be at least 1" in done.stderr
+
+
+def test_a_schedule_has_the_same_result_first_in_a_process_and_in_a_copy_of_it() -> None:
+    faults = [Fault(1.0, "command", "", 0.1, 0.28), Fault(1.2, "kill", "slave_side", 0.3, 0.5)]
+    copied = [apart(partial(run_seed, 4, faults)) for _ in range(2)]
+    assert copied == 2 * [run_seed(4, faults)]

@@ -192,7 +192,7 @@ MUTANTS = (
              "reach = 1.5 * p.speed_limit[i] * dt\n        step = min(max(s.filtered"),
             (_COMMANDS, "reach, before = p.speed_limit[i] * dt,", "reach, before = 1.5 * p.speed_limit[i] * dt,")),
            ("loss_heavy", "hiccup", "delay"),
-           schedule=Schedule("speed", ((1.6, "standstill", "hand_side", 0.3, 0.5),))),
+           schedule=Schedule("speed", ((1.6, "standstill", "hand_side", 0.3, 0.5),), seed=1)),
     _mutant("tool_fast", "nothing limits the speed of the tool that joints move (as in "
             "xArm-Python-SDK #88)", _COMMANDS, "if step > most:", "if step > 1e9:", "fast_hand",
             schedule=Schedule("tool speed", ((1.0, "drive", "", 2.0, 0.5),))),
