@@ -243,11 +243,11 @@ MUTANTS = (
     Mutant("commands_queued", "commands that waited during an outage run after it (as in "
            "stretch_web_teleop #3)",
            (("nodes/streams.py", "_WAITING = 20", "_WAITING = 20_000"),
-            ("nodes/streams.py", "while self._pressed() == before and self.take():", "while False:")),
+            ("nodes/wire.py", "if r.is_buttons and not (target", "if not r.is_buttons or not (target")),
            (), schedule=Schedule("age", ((2.0, "standstill", "slave_side", 3.0, 0.5),))),
     Mutant("queue_kept", "a queue grows for as long as its reader stands still",
            (("nodes/streams.py", "_WAITING = 20", "_WAITING = 20_000"),
-            ("nodes/streams.py", "while self._pressed() == before and self.take():", "while False:")),
+            ("nodes/wire.py", "if r.is_buttons and not (target", "if not r.is_buttons or not (target")),
            (), schedule=Schedule("queues", ((2.0, "standstill", "slave_side", 4.5, 0.5),))),
     _mutant("engage_jumps", "who engages leads on from where the hand was (as in moveit2 #3378 and "
             "IsaacTeleop #730)", "coupling/mapping/motion_scaling.py",
