@@ -295,7 +295,7 @@ MUTANTS = (
             schedule=Schedule("recorded", ((2.0, "gone disk", "", 1.0, 0.5),))),
     Mutant("losses_untold", "what waits for a recorder that stands still is lost, and not counted "
            "(as in rosbag2 #477)",
-           (("nodes/feed.py", "len(self._feed.waiting) < MOST", "len(self._feed.waiting) < 50_000"),
+           (("nodes/feed.py", "if fill and len(self.waiting) < MOST", "if fill and len(self.waiting) < 50_000"),
             ("nodes/feed.py", "lost = number - last.get(index, number - 1) - 1", "lost = 0")),
            (), schedule=Schedule("recorded", ((2.0, "standstill", "recorder", 2.5, 0.5),))),
     _mutant("not_closed", "the recording is left open at the end", _RECORDER,
