@@ -2,6 +2,7 @@
 
     python benchmarks/search.py --minutes 5              # of processor time for each
     python benchmarks/search.py --cost 6                 # the same schedules with and without marks
+    python benchmarks/search.py --unmet out/search       # branches that no schedule of a store met
 
 Dice are schedules of successive seeds, the rarest of each three, as of ``teleop drill --seeds``. The first schedule of
 a process loads the kernels and is not counted.
@@ -16,6 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from teleop_core.nodes.crews import Processes
+from teleop_drill.simulation.branches import Branches
 from teleop_drill.simulation.planned import Schedule
 from teleop_drill.simulation.schedules import draw
 from teleop_drill.simulation.search import Search, run_measured
@@ -78,13 +80,36 @@ def cost(count: int, seed: int) -> None:
     print(f"marks: {100.0 * (np.median(ratio) - 1.0):.1f} % more processor time, median of {count} schedules")
 
 
+def unmet(folder: Path) -> None:
+    """Branches of ``nodes`` and ``bags`` that no schedule of a store met: a line for each file."""
+    branches, store = Branches(), Store(folder)
+    run_seed(0, ())
+    branches.begin()
+    total: dict[str, list[str]] = {}
+    for name in branches.names:
+        file, _, place = name.partition(":")
+        total.setdefault(file, []).append(place)
+    count = missed = 0
+    print("| file | met | of | not met |\n|---|---|---|---|")
+    for file, places in sorted(total.items()):
+        left = [place for place in places if not store.times[f"{file}:{place}"]]
+        count, missed = count + len(places), missed + len(left)
+        text = "all: no simulated session runs it" if len(left) == len(places) else ", ".join(left)
+        print(f"| {file} | {len(places) - len(left)} | {len(places)} | {text} |")
+    print(f"\n{count - missed} of {count} branches met in {store.coverage.sessions} schedules")
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description="Search beside dice.")
     parser.add_argument("ways", nargs="*", help="of dice and search; without one, both", default=["dice", "search"])
     parser.add_argument("--minutes", type=float, default=5.0, help="processor time of each")
     parser.add_argument("--seed", type=int, default=0, help="first seed")
     parser.add_argument("--cost", type=int, default=0, help="schedules with and without marks, in place of the search")
+    parser.add_argument("--unmet", type=Path, metavar="STORE", help="branches that no schedule of a store met")
     given = parser.parse_args()
+    if given.unmet is not None:
+        unmet(given.unmet)
+        return
     run_seed(given.seed, ())
     if given.cost:
         cost(given.cost, given.seed)

@@ -108,7 +108,7 @@ def test_branches_that_ran_are_named_by_line_and_side_and_marks_change_no_result
     lines = {int(name.split(":")[1].split()[0]) for name in branches.ran()}
     text = _MODULE.splitlines()
     assert {text[line - 1].split()[0] for line in lines} == {"for", "if", "elif", "while", "except", "case"}
-    assert branches.count == len(branches.ran()) + 2  # `Thing.keys` has not run
+    assert len(branches.names) == len(branches.ran()) + 2  # `Thing.keys` has not run
     assert module.Thing().big == []
     branches.begin()
     module.plain([1])

@@ -6,11 +6,13 @@ import shlex
 import subprocess
 import sys
 from collections import Counter
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from teleop_core.base.workers import apart
 from teleop_core.graph.operation import State
 from teleop_core.nodes.crews import Processes
 from teleop_core.nodes.operation import StopInput
@@ -132,3 +134,9 @@ def test_a_seed_is_known_once_each_of_its_faults_has_met_every_state() -> None:
     for state in State:
         met.update((one.kind, state.name) for one in draw(30, SIDES))
     assert seeds._known(30, met, Processes.SIDES) >= 1.0
+
+
+def test_a_schedule_has_the_same_result_first_in_a_process_and_in_a_copy_of_it() -> None:
+    faults = [Fault(1.0, "command", "", 0.1, 0.28), Fault(1.2, "kill", "slave_side", 0.3, 0.5)]
+    copied = [apart(partial(run_seed, 4, faults)) for _ in range(2)]
+    assert copied == 2 * [run_seed(4, faults)]

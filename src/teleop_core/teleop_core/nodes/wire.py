@@ -5,9 +5,9 @@ signals, of buffers, and of the middleware's objects. One call then takes, admit
 stage, or writes or sends all of them, without the interpreter. Python decides only what is rare: a message of another
 form, a link with a delay, a report.
 
-The middleware is reached in two ways. ROS gives the addresses of its C functions, so that kernels take and send by
-themselves. Any other world, such as a simulated one, takes and sends in Python; admission, reading, acceptance and
-writing are the same kernels.
+The middleware is reached in two ways. ROS and the simulated machine give the addresses of C functions, so that kernels
+take and send by themselves. A world without them takes and sends in Python; admission, reading, acceptance and writing
+are the same kernels.
 """
 
 from typing import Annotated

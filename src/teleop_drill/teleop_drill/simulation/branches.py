@@ -45,9 +45,9 @@ class Branches:
         return [name for name, mark in zip(self._names, self._marks, strict=True) if mark]
 
     @property
-    def count(self) -> int:
-        """Number of marked branches."""
-        return len(self._names)
+    def names(self) -> tuple[str, ...]:
+        """Names of all marked branches."""
+        return tuple(self._names)
 
     def _mark(self, module: ModuleType) -> None:
         path = Path(module.__file__ or "")

@@ -206,7 +206,7 @@ class Bus:
     def carry(self, writer: Writer, link: Match, taken: Taken) -> None:
         """Deliver a message to a reader."""
         reader, draw = link.reader, self._random.random
-        line = self.line(writer.process, reader.process)
+        line = self.line(writer.process, reader.process) if self.lines else self._plain
         now_ns = self.scheduler.now_ns
         came_ns = now_ns + 40_000 + round(60_000 * draw())
         if line is not self._plain:

@@ -152,7 +152,7 @@ class Reader:
         self._reached = Reached(bus.scheduler.now_at, self._take_at, bus.scheduler.keep)
         self._message, self._info = (ctypes.c_int64 * 2)(), (ctypes.c_int64 * 7)()
         """``rcutils_uint8_array_t`` and ``rmw_message_info_t`` of the last taken message, for kernels."""
-        self._buffer, self._taken = ctypes.create_string_buffer(_ROOM), Taken(b"", b"", 0, 0, 0)
+        self._buffer, self._found = ctypes.create_string_buffer(_ROOM), (0, Taken(b"", b"", 0, 0, 0))
 
     @property
     def places(self) -> tuple[int, int, int] | None:
@@ -163,14 +163,15 @@ class Reader:
 
     def taken(self) -> Taken:
         """The last message that was taken, also by a kernel."""
-        return self._taken
+        came_ns, (data, sender, number, sent_ns, _) = self._found
+        return Taken(data, sender, number, sent_ns, came_ns)
 
     def _take_at(self, _: int, __: int) -> int:
         """:meth:`take` for a kernel."""
-        taken = self.take()
-        if taken is None:
+        if (found := self._pop()) is None:
             return _EMPTY
-        self._taken, (data, sender, number, sent_ns, came_ns) = taken, taken
+        came_ns, (data, sender, number, sent_ns, _) = found
+        self._found = found
         if len(data) > len(self._buffer):
             self._buffer = ctypes.create_string_buffer(len(data))
         at = ctypes.addressof(self._buffer)
@@ -186,6 +187,13 @@ class Reader:
 
     def take(self) -> Taken | None:
         """Remove and return the oldest waiting message; None if no message waits."""
+        if (found := self._pop()) is None:
+            return None
+        came_ns, (data, sender, number, sent_ns, _) = found
+        return Taken(data, sender, number, sent_ns, came_ns)
+
+    def _pop(self) -> tuple[int, Taken] | None:
+        """Remove the oldest waiting message; its time of arrival by the machine's clock [ns], and the message."""
         scheduler = self._bus.scheduler
         scheduler.now_ns = now_ns = scheduler.now_ns + TAKE_NS
         coming, ready = self.coming, self._ready
@@ -197,8 +205,7 @@ class Reader:
         self._note()
         if self.topic in self._bus.heard:
             self._bus.heard[self.topic](self, taken)
-        data, sender, number, sent_ns, _ = taken
-        return Taken(data, sender, number, sent_ns, came_ns + self.process.machine.clock.ahead_ns(now_ns))
+        return came_ns + self.process.machine.clock.ahead_ns(now_ns), taken
 
     def wait(self, seconds: float) -> None:
         """Wait until a message arrives, at most for a time [s]."""
@@ -239,7 +246,8 @@ class Reader:
             self.coming = deque(ordered)
         else:
             self.coming.append(entry)
-        self._note()
+        if self.coming[0] is entry:
+            self._note()
         if self.waiting is not None or self.told is not None:
             self._bus.scheduler.at(came_ns, self.tell)
 
