@@ -10,12 +10,12 @@ from pathlib import Path
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
-from teleop_core.middleware.world import Qos
+from teleop_core.middleware.platform import Qos
 from teleop_core.robots import load_robot
 from teleop_drill import chosen
 from teleop_drill.simulation.drill import simulated_drill
+from teleop_drill.simulation.platform import SimulatedPlatform
 from teleop_drill.simulation.stand_ins import run_node
-from teleop_drill.simulation.world import SimulatedWorld
 
 ROBOT = load_robot("rcrt1")
 COMMANDS = "/forward_position_controller/commands"
@@ -37,9 +37,9 @@ class Controller:
     coasts: float = 0.0
     order: tuple[str, ...] = ORDER
 
-    def run(self, world: SimulatedWorld) -> int:
+    def run(self, platform: SimulatedPlatform) -> int:
         """Run the process of the controller."""
-        self.world, node, executor = world, world.node("controller"), world.executor()
+        self.platform, node, executor = platform, platform.node("controller"), platform.executor()
         self.place = dict(zip(ROBOT.joint_names, ROBOT.home.tolist(), strict=True))
         self.coming, self.taken_ns = [(0, self.place)], 0
         executor.add_node(node)
@@ -51,13 +51,13 @@ class Controller:
 
     def take(self, message: Float64MultiArray) -> None:
         """Store a command, which takes effect later."""
-        self.taken_ns = self.world.time_ns()
+        self.taken_ns = self.platform.time_ns()
         goal = dict(zip(self.order, message.data, strict=True))
         self.coming.append((self.taken_ns + self.delay_ns, goal))
 
     def cycle(self) -> None:
         """Advance by one period, and publish the joint positions."""
-        now_ns = self.world.time_ns()
+        now_ns = self.platform.time_ns()
         while len(self.coming) > 1 and self.coming[1][0] <= now_ns:
             self.coming.pop(0)
         if 4e6 < now_ns - self.taken_ns < 1e9 * self.coasts:
@@ -71,9 +71,9 @@ class Controller:
         self.says.publish(said)
 
 
-def bridge(world: SimulatedWorld) -> int:
+def bridge(platform: SimulatedPlatform) -> int:
     """Run the process of the bridge."""
-    return run_node(world, "arm_bridge", kind="forward_command", order=ORDER)
+    return run_node(platform, "arm_bridge", kind="forward_command", order=ORDER)
 
 
 def main() -> None:

@@ -126,8 +126,8 @@ class Peer(AnyPeer):
         self.context = Context()
         self.context.init(args=[], domain_id=int(self.domain))
         self.node = Node("peer", context=self.context, use_global_arguments=False, enable_rosout=False)
-        self.world, self.ros = ros.RosWorld(self.context), ros_node.RosNode(self.node)
-        self.executor = self.world.executor()
+        self.platform, self.ros = ros.RosPlatform(self.context), ros_node.RosNode(self.node)
+        self.executor = self.platform.executor()
         self.executor.add_node(self.ros)
         self.observer = ReportReader(int(self.domain))
 

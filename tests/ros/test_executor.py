@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from std_srvs.srv import Trigger
 
-from teleop_core.middleware.world import WorldEndedError
+from teleop_core.middleware.platform import PlatformEndedError
 from teleop_core.nodes.guest import Guest
 
 pytestmark = pytest.mark.ros
@@ -46,7 +46,7 @@ def noting(done: list[str]) -> Callable[[Any, Any], Any]:
 
 
 def test_services_clients_timers_and_deferred_work_are_served(guest: Guest) -> None:
-    executor, done = guest.world.executor(), list[str]()
+    executor, done = guest.platform.executor(), list[str]()
     executor.add_node(guest.ros)
     guest.ros.create_service(Trigger, "asked", noting(done))
     client = guest.ros.create_client(Trigger, "asked")
@@ -59,7 +59,7 @@ def test_services_clients_timers_and_deferred_work_are_served(guest: Guest) -> N
 
 
 def test_an_entity_that_comes_later_is_served_and_one_that_goes_is_not(guest: Guest) -> None:
-    executor, done = guest.world.executor(), list[str]()
+    executor, done = guest.platform.executor(), list[str]()
     executor.add_node(guest.ros)
     for _ in range(3):
         executor.spin_once(0.01)
@@ -74,7 +74,7 @@ def test_an_entity_that_comes_later_is_served_and_one_that_goes_is_not(guest: Gu
 
 
 def test_an_error_of_a_callback_reaches_the_caller_and_the_next_call_goes_on(guest: Guest) -> None:
-    executor, done = guest.world.executor(), list[str]()
+    executor, done = guest.platform.executor(), list[str]()
     executor.add_node(guest.ros)
 
     def fail() -> None:
@@ -90,7 +90,7 @@ def test_an_error_of_a_callback_reaches_the_caller_and_the_next_call_goes_on(gue
 
 def test_a_wait_without_limit_ends_when_another_thread_wakes_it_or_ends_the_middleware() -> None:
     guest = Guest("executor_end")
-    executor = guest.world.executor()
+    executor = guest.platform.executor()
     executor.add_node(guest.ros)
     for _ in range(5):  # what discovery and the first look had to serve
         executor.spin_once(0.05)
@@ -98,6 +98,6 @@ def test_a_wait_without_limit_ends_when_another_thread_wakes_it_or_ends_the_midd
     begin = time.monotonic()
     executor.spin_once()
     assert time.monotonic() - begin < 5.0
-    threading.Timer(0.2, guest.world.shutdown).start()
-    with pytest.raises(WorldEndedError):
+    threading.Timer(0.2, guest.platform.shutdown).start()
+    with pytest.raises(PlatformEndedError):
         spin_for_ever(executor)

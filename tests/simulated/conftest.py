@@ -21,10 +21,10 @@ from teleop_core.robots import load_robot
 from teleop_core.session.configuration import Configuration
 from teleop_drill.simulation.bus import Bus
 from teleop_drill.simulation.machine import Machine, Process
+from teleop_drill.simulation.platform import SimulatedPlatform
 from teleop_drill.simulation.scheduler import Scheduler
 from teleop_drill.simulation.session import flattened, parameters_of
 from teleop_drill.simulation.stand_ins import SimulatedWatch, Work
-from teleop_drill.simulation.world import SimulatedWorld
 
 _START = 0.05  # of a process [s]
 _PAUSE = 0.002  # from one look at a condition to the next [s]
@@ -38,17 +38,17 @@ class SimulatedNode:
         self,
         peer: "SimulatedPeer",
         name: str,
-        crew: Callable[[SimulatedWorld], Crew],
+        crew: Callable[[SimulatedPlatform], Crew],
         given: Mapping[str, Mapping[str, Any]],
     ) -> None:
         self.name, self._peer, self.crew = name, peer, None
         self.process = self.stderr = self
 
         def work(process: Process) -> int:
-            world = SimulatedWorld(peer.bus, process, given)
-            self.crew = crew(world)  # type: ignore[assignment]
-            watch = SimulatedWatch(world, self.crew, process)
-            return serve(self.crew, watch, world)
+            platform = SimulatedPlatform(peer.bus, process, given)
+            self.crew = crew(platform)  # type: ignore[assignment]
+            watch = SimulatedWatch(platform, self.crew, process)
+            return serve(self.crew, watch, platform)
 
         self.own = peer.machine.start(name, work, after=_START)
         peer.bus.watch(self.own)
@@ -101,24 +101,24 @@ class SimulatedPeer(AnyPeer):
         self.bus = Bus(self.machine.scheduler)
         owner = self.machine.outsider("test")
         self.bus.watch(owner)
-        self.world = SimulatedWorld(self.bus, owner)
-        self.ros = self.world.node("peer")
-        self.executor = self.world.executor()
+        self.platform = SimulatedPlatform(self.bus, owner)
+        self.ros = self.platform.node("peer")
+        self.executor = self.platform.executor()
         self.executor.add_node(self.ros)
-        self.observer = ReportReader(0, world=self.world)
+        self.observer = ReportReader(0, platform=self.platform)
 
     def launch(self, name: str, parameters: dict[str, Any], arm: str, env: Mapping[str, str] | None) -> SimulatedNode:
         full = f"{arm}/{name}".strip("/")
         return SimulatedNode(
             self,
             full,
-            lambda world: make_node(STAGES.find(name), namespace=arm, world=world),
+            lambda platform: make_node(STAGES.find(name), namespace=arm, platform=platform),
             {full: flattened(parameters)},
         )
 
     def foreign(self, name: str, work: Work) -> Process:
         """Start a process of others, which goes on until it is ended."""
-        made = self.machine.start(name, lambda process: work(SimulatedWorld(self.bus, process)), after=_START)
+        made = self.machine.start(name, lambda process: work(SimulatedPlatform(self.bus, process)), after=_START)
         self.bus.watch(made)
         return made
 
@@ -127,7 +127,7 @@ class SimulatedPeer(AnyPeer):
         made = SimulatedNode(
             self,
             "side",
-            lambda world: TeleopSession("", names, world, build_graph()),
+            lambda platform: TeleopSession("", names, platform, build_graph()),
             {name: flattened(values) for name, values in parameters.items()},
         )
         self.nodes.append(made)
@@ -156,7 +156,7 @@ class SimulatedPeer(AnyPeer):
         made = SimulatedNode(
             self,
             "session",
-            lambda world: TeleopSession(namespace, (), world, graph),
+            lambda platform: TeleopSession(namespace, (), platform, graph),
             {name: flattened(values) for name, values in given.items()},
         )
         self.nodes.append(made)

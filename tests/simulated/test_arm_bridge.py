@@ -11,13 +11,13 @@ from std_msgs.msg import Float64MultiArray, String
 from simulated_arms import controller
 from teleop_core.graph.topics import SLAVE_MEASURED_JS
 from teleop_core.kernels.geometry import Array
-from teleop_core.middleware.world import Qos
+from teleop_core.middleware.platform import Qos
 from teleop_core.robots import load_robot
 from teleop_core.slave.operation import Fault
 from teleop_drill import chosen
 from teleop_drill.simulation.drill import simulated_drill
+from teleop_drill.simulation.platform import SimulatedPlatform
 from teleop_drill.simulation.stand_ins import run_node
-from teleop_drill.simulation.world import SimulatedWorld
 
 if TYPE_CHECKING:
     from peers import AnyPeer as Peer
@@ -167,8 +167,8 @@ UR5E: dict[str, Any] = {"robot": str(URDF), "geometry": ("tip=tool0",)}
 
 @pytest.mark.slow
 def test_the_drill_finds_an_arm_from_a_urdf_lost(tmp_path: Path) -> None:
-    def bridge(world: SimulatedWorld) -> int:
-        return run_node(world, "arm_bridge", kind="forward_command", rate=500, **UR5E)
+    def bridge(platform: SimulatedPlatform) -> int:
+        return run_node(platform, "arm_bridge", kind="forward_command", rate=500, **UR5E)
 
     settings = (f"robot={URDF}", "geometry=[tip=tool0]", "start=[0.0,-1.57,1.57,-1.57,-1.57,0.0]")
     rows = chosen(("kill_slave_sim",), is_composed=False)

@@ -60,7 +60,7 @@ def test_slave_answers_every_sample_of_its_arm_also_several_that_come_within_a_t
 @pytest.mark.parametrize("count", [200, 400])
 def test_what_comes_while_a_node_is_late_waits_for_it_up_to_its_catch_up(peer: "Peer", count: int) -> None:
     given = {"max_catch_up": 300, "autostart": False}
-    node = make_node(STAGES.find("slave"), world=peer.world, values=given)
+    node = make_node(STAGES.find("slave"), platform=peer.platform, values=given)
     node.ros.trigger("configure")
     measured = node.input(topics.SLAVE_MEASURED_JS)
     for tick in range(1, count + 1):

@@ -15,8 +15,8 @@ from teleop_drill.nodes.conformance_arm import ArmClient
 def findings_of(fault: str, *, may_move: bool = True) -> dict[str, Finding]:
     """What is found of an arm with a fault, by topic."""
     peer = SimulatedPeer()
-    peer.foreign("foreign", lambda world: ForeignArm(world, (fault,)).serve())
-    with ArmClient("PSM", world=peer.world) as arm:
+    peer.foreign("foreign", lambda platform: ForeignArm(platform, (fault,)).serve())
+    with ArmClient("PSM", platform=peer.platform) as arm:
         assert arm.is_there(20.0)
         return {found.row.name: found for found in examine(arm, may_move=may_move)}
 
@@ -39,7 +39,7 @@ def test_an_arm_without_fault_passes_and_is_only_moved_by_what_it_takes() -> Non
 
 
 def test_a_signal_ends_a_test_where_it_waits() -> None:
-    with ArmClient("PSM", world=SimulatedPeer().world) as arm:
+    with ArmClient("PSM", platform=SimulatedPeer().platform) as arm:
         arm.interrupt.ask()
         with pytest.raises(KeyboardInterrupt):
             arm.is_there(60.0)

@@ -25,7 +25,7 @@ def test_a_page_sees_the_arm_stops_it_changes_a_parameter_and_names_the_recordin
     peer: "Peer", compose: "Callable[..., Any]", tmp_path: Path
 ) -> None:
     compose()
-    with LiveLink(0, world=peer.world) as link:
+    with LiveLink(0, platform=peer.platform) as link:
 
         def arm() -> Any:
             return link.view().arms[""]
@@ -61,10 +61,10 @@ def test_a_person_sees_the_slave_as_late_as_the_display_says_and_presses_at_the_
     late, out = 0.4, str(tmp_path / "bag")
     made = configuration("point", settings={"operator.kind": "remote", "display.latency": late, "display.rate": RATE})
     peer._session("", made.graph, parameters_of(made, out, ""))  # type: ignore[attr-defined]
-    with LiveLink(0, world=peer.world) as link:
+    with LiveLink(0, platform=peer.platform) as link:
 
         def ages() -> Any:
-            arm, now_ns = link.view().arms[""], peer.world.time_ns()
+            arm, now_ns = link.view().arms[""], peer.platform.time_ns()
             names = topics.MASTER_MEASURED_CP.name, topics.SLAVE_MEASURED_CP.name
             return [1e-9 * (now_ns - arm.stamp_ns[name]) for name in names if name in arm.stamp_ns]
 

@@ -11,7 +11,7 @@ from std_msgs.msg import Empty
 
 from stock_client import MIDDLE, StockClient, crtk
 from teleop_core.kernels.geometry import Array, framed_wrenches
-from teleop_core.middleware.world import Qos
+from teleop_core.middleware.platform import Qos
 
 if TYPE_CHECKING:
     from peers import AnyPeer as Peer

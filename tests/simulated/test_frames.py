@@ -12,7 +12,7 @@ from teleop_core.bags.markers import MARKERS
 from teleop_core.bags.transforms import ROBOT_DESCRIPTION, TF
 from teleop_core.graph.graph import build_graph
 from teleop_core.graph.topics import SLAVE_MEASURED_JS, Topic
-from teleop_core.middleware.world import Qos
+from teleop_core.middleware.platform import Qos
 from teleop_core.nodes.crews import Processes, crews
 from teleop_core.nodes.display import displayed
 from teleop_core.nodes.streams import Subscription, message_type

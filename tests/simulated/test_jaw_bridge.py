@@ -8,7 +8,7 @@ from std_msgs.msg import Float64MultiArray
 
 from simulated_arms import controller
 from teleop_core.graph.topics import SLAVE_JAW_MEASURED_JS, SLAVE_JAW_SERVO_JP
-from teleop_core.middleware.world import Qos
+from teleop_core.middleware.platform import Qos
 
 if TYPE_CHECKING:
     from peers import AnyPeer as Peer

@@ -43,7 +43,7 @@ def send(peer: Any) -> Any:
 def camera(peer: Any) -> Any:
     from teleop_core_lerobot import LiveCamera
 
-    with LiveCamera("front", world=peer.world) as made:
+    with LiveCamera("front", platform=peer.platform) as made:
         peer.sleep(0.2)
         yield made
 
@@ -75,7 +75,7 @@ def test_each_picture_is_new_once_and_the_next_is_waited_for(camera: "LiveCamera
 def test_camera_that_does_not_listen_says_so(peer: Any) -> None:
     from teleop_core_lerobot import LiveCamera
 
-    camera = LiveCamera("/any/topic", world=peer.world)
+    camera = LiveCamera("/any/topic", platform=peer.platform)
     assert camera.topic == "any/topic"
     with pytest.raises(tc.SessionError, match="begin first"):
         camera.newest()

@@ -44,9 +44,9 @@ def test_pictures_of_a_live_session_carry_the_stamp_of_their_poses(
     image, _ = topics_of(VIEW)
     network = build(NetworkParameters, {f"back.{name}": value for name, value in back.items()})
 
-    def work(world: Any) -> int:
+    def work(platform: Any) -> int:
         counts.append(
-            run(SCENE, [VIEW], rate=20.0, network=network, world=world, interrupt=interrupt, say=lambda _: None)
+            run(SCENE, [VIEW], rate=20.0, network=network, platform=platform, interrupt=interrupt, say=lambda _: None)
         )
         return 0
 

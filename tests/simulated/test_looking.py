@@ -20,7 +20,7 @@ ROBOT = load_robot("rcrt1")
 def test_topics_are_listed_with_type_and_ends_and_their_rate_is_that_of_the_slave(peer: "Peer") -> None:
     peer.start("slave")
     peer.start("slave_sim")
-    with LookingNode(0, world=peer.world) as look:
+    with LookingNode(0, platform=peer.platform) as look:
         seen = look.topics()["/slave/measured_js"]
         assert seen.ros_type == "sensor_msgs/msg/JointState"
         assert seen.publishers == 1
@@ -36,7 +36,7 @@ def test_topics_are_listed_with_type_and_ends_and_their_rate_is_that_of_the_slav
 
 def test_parameters_are_read_and_set_with_the_type_that_they_have(peer: "Peer") -> None:
     peer.start("motion_scaling")
-    with LookingNode(0, world=peer.world) as look:
+    with LookingNode(0, platform=peer.platform) as look:
         assert "/motion_scaling" in look.nodes()
         assert look.parameters("motion_scaling")["coarse_gain"] == look.parameter("/motion_scaling", "coarse_gain")
         look.change("motion_scaling", "coarse_gain", 1)  # a whole number for a number
@@ -51,7 +51,7 @@ def test_parameters_are_read_and_set_with_the_type_that_they_have(peer: "Peer") 
 
 def test_services_are_listed_and_called_and_a_missing_one_is_told(peer: "Peer") -> None:
     peer.start("slave")
-    with LookingNode(0, patience=1.0, world=peer.world) as look:
+    with LookingNode(0, patience=1.0, platform=peer.platform) as look:
         assert "/slave/enable" in look.services()
         assert look.trigger("slave/pause") == (True, "pause: done")
         is_done, text = look.trigger("slave/home")

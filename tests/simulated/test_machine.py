@@ -12,12 +12,12 @@ from std_msgs.msg import Bool, Empty
 
 from simulated.conftest import SimulatedPeer
 from teleop_core.kernels.memory import call
-from teleop_core.middleware.world import Qos
+from teleop_core.middleware.platform import Qos
 from teleop_drill.simulation.bus import Bus, Line
 from teleop_drill.simulation.machine import Machine, Process
+from teleop_drill.simulation.platform import SimulatedPlatform
 from teleop_drill.simulation.reach import LOOK_NS
 from teleop_drill.simulation.scheduler import Deadlock, Scheduler
-from teleop_drill.simulation.world import SimulatedWorld
 
 FOUND = 2.0  # by then all have found each other [s]
 
@@ -31,14 +31,14 @@ class Pair:
         self.outside = self.machine.outsider("test")
         self.here, self.there = (self._process(name) for name in ("here", "there"))
 
-    def _process(self, name: str) -> SimulatedWorld:
+    def _process(self, name: str) -> SimulatedPlatform:
         def work(process: Process) -> int:
             while True:
                 self.machine.scheduler.sleep(1e3)
 
         process = self.machine.start(name, work)
         self.bus.watch(process)
-        return SimulatedWorld(self.bus, process)
+        return SimulatedPlatform(self.bus, process)
 
     def process(self, name: str) -> Process:
         return next(one for one in self.machine.processes if one.name == name)
@@ -103,19 +103,19 @@ def test_threads_that_read_and_write_without_a_lock_lose_counts_where_turns_are_
     machine, total = Machine(Scheduler(0, breaks)), 0
 
     def work(process: Process) -> int:
-        world = SimulatedWorld(Bus(machine.scheduler), process)
-        lock = world.lock() if has_lock else nullcontext()
+        platform = SimulatedPlatform(Bus(machine.scheduler), process)
+        lock = platform.lock() if has_lock else nullcontext()
 
         def count() -> None:
             nonlocal total
             for _ in range(100):
                 with lock:
                     before = total
-                    world.monotonic_ns()
+                    platform.monotonic_ns()
                     total = before + 1
-                world.sleep(1e-4)
+                platform.sleep(1e-4)
 
-        threads = [world.thread(name, count) for name in ("one", "other")]
+        threads = [platform.thread(name, count) for name in ("one", "other")]
         for thread in threads:
             thread.start()
         for thread in threads:

@@ -11,7 +11,7 @@ from sensor_msgs.msg import Joy
 
 from foreign_hand import AXES, ROWS, TYPES, Device, stamp, turning
 from teleop_core.graph.topics import MASTER_BUTTONS, MASTER_MEASURED_CP, MASTER_SERVO_CF, SLAVE_SERVO_CP
-from teleop_core.middleware.world import Qos
+from teleop_core.middleware.platform import Qos
 
 if TYPE_CHECKING:
     from peers import AnyPeer as Peer

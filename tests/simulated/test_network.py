@@ -35,7 +35,7 @@ class Sender:
         stamp = (len(self.sent_ns) + 2) * MS
         pose = (1e-9 * stamp, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
         self.peer.send(SLAVE_SETPOINT_CP, stamp, (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0))
-        self.sent_ns[stamp] = self.peer.world.monotonic_ns()
+        self.sent_ns[stamp] = self.peer.platform.monotonic_ns()
         self.peer.send(SLAVE_SERVO_CP, stamp, pose)
 
 
@@ -49,7 +49,7 @@ def test_a_foreign_publisher_is_behind_the_network_and_nothing_comes_before_its_
         sender.send()
         before = len(came.stamps)
         came.take()
-        now_ns = peer.world.monotonic_ns()
+        now_ns = peer.platform.monotonic_ns()
         ages.extend(now_ns - sender.sent_ns[stamp] for stamp in came.stamps[before:])
         return len(ages) > 200 and back.take()
 
@@ -60,12 +60,12 @@ def test_a_foreign_publisher_is_behind_the_network_and_nothing_comes_before_its_
     value = ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=1.0)
     request = SetParameters.Request(parameters=[Parameter(name="there.loss", value=value)])
     assert peer.call(SetParameters, "/network/set_parameters", request).results[0].successful
-    set_ns = peer.world.monotonic_ns()
+    set_ns = peer.platform.monotonic_ns()
 
     def quiet() -> bool:
         sender.send()
         came.take()
-        return peer.world.monotonic_ns() - set_ns > 3 * DELAY * 1e9
+        return peer.platform.monotonic_ns() - set_ns > 3 * DELAY * 1e9
 
     peer.wait(quiet, "what was on its way has come")
     last = came.stamps[-1]

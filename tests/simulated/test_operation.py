@@ -13,7 +13,7 @@ from std_srvs.srv import Trigger
 from teleop_core.bags.reports import read_reports
 from teleop_core.graph.operation import State
 from teleop_core.graph.topics import SLAVE_OPERATION, SLAVE_SERVO_JP, SLAVE_SETPOINT_JS
-from teleop_core.middleware.world import Publisher, Qos
+from teleop_core.middleware.platform import Publisher, Qos
 from teleop_core.nodes.operation import STOP_TOPIC, StopButton
 from teleop_core.nodes.streams import Subscription
 from teleop_core.robots import load_robot

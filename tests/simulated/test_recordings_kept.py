@@ -11,7 +11,7 @@ from geometry_msgs.msg import PoseStamped
 from teleop_core.bags.messages import layout
 from teleop_core.bags.reader import Bag, recover
 from teleop_core.graph import topics
-from teleop_core.middleware.world import Qos
+from teleop_core.middleware.platform import Qos
 from teleop_drill.simulation.bus import Line
 
 if TYPE_CHECKING:
@@ -64,7 +64,7 @@ def test_what_the_middleware_brings_after_a_feed_has_begun_does_not_stand_behind
     peer: "SimulatedPeer", tmp_path: Path
 ) -> None:
     """A busy machine brought one sample 39 ms after newer ones of the feed: its stamps went back."""
-    topic, world = topics.MASTER_MEASURED_CP, peer.world
+    topic, platform = topics.MASTER_MEASURED_CP, peer.platform
     form, pose = layout(topic, ()), np.eye(7)[3]
     peer.bus.lines["*", "recorder"] = Line(delay=0.005)
     recorder = peer.start("recorder", out=str(tmp_path / "bag"))
@@ -72,18 +72,18 @@ def test_what_the_middleware_brings_after_a_feed_has_begun_does_not_stand_behind
     sender = peer.ros.create_publisher(PoseStamped, f"/{topic.name}", Qos())
 
     def is_heard() -> bool:
-        sender.send(form.encode_one(world.time_ns(), pose))
+        sender.send(form.encode_one(platform.time_ns(), pose))
         return bool(channel.received)
 
     peer.wait(is_heard, "a sample")
     recorder.send_signal(signal.SIGSTOP)
-    sender.send(form.encode_one(world.time_ns(), pose))
-    channel.join(True, world.time_ns())
+    sender.send(form.encode_one(platform.time_ns(), pose))
+    channel.join(True, platform.time_ns())
     for _ in range(10):
-        world.sleep(0.001)
-        channel.give(form.encode_one(world.time_ns(), pose), world.time_ns())
+        platform.sleep(0.001)
+        channel.give(form.encode_one(platform.time_ns(), pose), platform.time_ns())
     recorder.send_signal(signal.SIGCONT)
-    world.sleep(0.1)
+    platform.sleep(0.1)
     assert recorder.end() == 0
     series = Bag(tmp_path / "bag").read(topic)
     assert len(series) > 11

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 def test_a_stop_is_said_until_every_arm_rests_and_each_goes_on_when_it_is_told(peer: "Peer") -> None:
     peer.start("slave", arm="left")
     peer.start("slave", arm="right")
-    remote = RemoteControl(0, world=peer.world)
+    remote = RemoteControl(0, platform=peer.platform)
     assert set(remote.look()) == {"left", "right"}
     stopped = remote.stop()
     assert all(arm.values["state"] == State.FAULT for arm in stopped.values())

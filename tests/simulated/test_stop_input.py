@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from std_msgs.msg import Bool
 
-from teleop_core.middleware.world import Qos
+from teleop_core.middleware.platform import Qos
 from teleop_core.nodes.operation import STOP_TOPIC, StopButton, StopInput
 
 if TYPE_CHECKING:

@@ -9,10 +9,10 @@ import pytest
 from teleop_core.bags.messages import layout
 from teleop_core.graph import topics
 from teleop_core.graph.stage import STAGES
-from teleop_core.middleware.world import Qos
+from teleop_core.middleware.platform import Qos
 from teleop_core.nodes.recorder import DISCOVERY_NS
 from teleop_core.nodes.streams import message_type
-from teleop_drill.simulation.world import SimulatedWorld
+from teleop_drill.simulation.platform import SimulatedPlatform
 
 if TYPE_CHECKING:
     from peers import AnyPeer as Peer
@@ -122,23 +122,25 @@ def test_a_recorder_tells_how_much_of_a_node_that_starts_again_came_before_it_kn
     topic, unheard, heard = topics.MASTER_MEASURED_CP, 300, list[int]()
     first = peer.publisher(topic)
     data = layout(topic, ()).encode_one(1, np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]))
-    begin_ns = peer.world.monotonic_ns()
+    begin_ns = peer.platform.monotonic_ns()
 
     def heard_for_longer_than_discovery_takes() -> bool:
         first.publish(data)
         received = peer.status("recorder").number(f"received.{topic.name}")
-        return received > 0 and peer.world.monotonic_ns() > begin_ns + DISCOVERY_NS
+        return received > 0 and peer.platform.monotonic_ns() > begin_ns + DISCOVERY_NS
 
     peer.wait(heard_for_longer_than_discovery_takes, "the first publisher")
 
-    def newcomer(world: SimulatedWorld) -> int:
-        second = world.node("newcomer").create_publisher(message_type(topic.kind.ros_type), topic.name, Qos(depth=10))
+    def newcomer(platform: SimulatedPlatform) -> int:
+        second = platform.node("newcomer").create_publisher(
+            message_type(topic.kind.ros_type), topic.name, Qos(depth=10)
+        )
         for _ in range(unheard):
             second.publish(data)
         heard.append(second.get_subscription_count())
         while True:
             second.publish(data)
-            world.sleep(0.01)
+            platform.sleep(0.01)
 
     peer.foreign("newcomer", newcomer)
     lost = f"lost.{topic.name}"

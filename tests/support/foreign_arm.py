@@ -10,7 +10,7 @@ from geometry_msgs.msg import PoseStamped
 from sensor_msgs.msg import JointState
 
 from foreign_hand import stamp
-from teleop_core.middleware.world import Publisher, Qos, World
+from teleop_core.middleware.platform import Platform, Publisher, Qos
 
 crtk = pytest.importorskip("crtk_msgs.msg")
 
@@ -21,22 +21,22 @@ could be told."""
 
 
 class ForeignArm:
-    """The arm, in whatever world.
+    """The arm, on whatever platform.
 
     Args:
-        world: Where it is.
+        platform: Where it is.
         faults: What is wrong with it.
     """
 
-    def __init__(self, world: World, faults: tuple[str, ...] = ()) -> None:
-        self.world, self.faults = world, set(faults)
+    def __init__(self, platform: Platform, faults: tuple[str, ...] = ()) -> None:
+        self.platform, self.faults = platform, set(faults)
         self.state = "DISABLED" if "disabled" in faults else "ENABLED"
         self.q, self.busy_until_ns = [0.1, 0.2, 0.3], 0
         self.goal, self.home = list(self.q), list(self.q)
         self.past: deque[list[float]] = deque(maxlen=50)
-        self.last_ns = world.time_ns()
-        node = world.node("foreign", use_global_arguments=False, enable_rosout=False)
-        self.executor = world.executor()
+        self.last_ns = platform.time_ns()
+        node = platform.node("foreign", use_global_arguments=False, enable_rosout=False)
+        self.executor = platform.executor()
         self.executor.add_node(node)
         self.states: Publisher | None = None
         if "no state" not in faults:
@@ -73,7 +73,7 @@ class ForeignArm:
             self.goal = list(message.position)
         if "ignores" not in self.faults and (self.state == "ENABLED" or "moves paused" in self.faults):
             self.goal = list(message.position)
-            self.busy_until_ns = self.world.monotonic_ns() + 150_000_000
+            self.busy_until_ns = self.platform.monotonic_ns() + 150_000_000
 
     def servo(self, message: Any) -> None:
         if self.state == "ENABLED" and "ignores" not in self.faults:
@@ -107,7 +107,7 @@ class ForeignArm:
         return pose
 
     def tick(self) -> None:
-        now_ns, is_busy = self.world.time_ns(), False
+        now_ns, is_busy = self.platform.time_ns(), False
         # Ten milliseconds, more on a busy machine: speeds are those of the time that passed.
         dt = max(1e-9 * (now_ns - self.last_ns), 1e-3)
         self.last_ns = now_ns
@@ -115,7 +115,7 @@ class ForeignArm:
             step = min(max(self.goal[i] - self.q[i], -SPEED * dt), SPEED * dt)
             self.q[i] += step
             is_busy = is_busy or abs(step) > 0.0
-        is_busy = (is_busy or self.world.monotonic_ns() < self.busy_until_ns) and "never busy" not in self.faults
+        is_busy = (is_busy or self.platform.monotonic_ns() < self.busy_until_ns) and "never busy" not in self.faults
         if self.states is not None:
             state = crtk.OperatingState(state=self.state, is_homed=True, is_busy=is_busy)
             stamp(state, now_ns)

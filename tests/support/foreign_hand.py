@@ -8,7 +8,7 @@ from geometry_msgs.msg import Pose, PoseStamped, TransformStamped, WrenchStamped
 from sensor_msgs.msg import Joy
 
 from teleop_core.graph import topics
-from teleop_core.middleware.world import Qos
+from teleop_core.middleware.platform import Qos
 
 if TYPE_CHECKING:
     from peers import AnyPeer as Peer

@@ -262,7 +262,7 @@ MUTANTS = (
            ("kill_motion_scaling",), composed=(),
            schedule=Schedule("recovery", ((2.0, "kill", "hand_side", 1.0, 0.5),))),
     _mutant("never_gives_way", "a loop that cannot keep up keeps its real-time priority", "nodes/strain.py",
-            "            self._world.give_way()\n", "",
+            "            self._platform.give_way()\n", "",
             schedule=Schedule("way", ((2.0, "slow turns", "slave_side", 6.0, 0.9),))),
     _mutant("drive_goes_on", "a joint goes on at its last speed when the link is lost (as in "
             "turtlebot3 #1154)", "slave/velocity.py",

@@ -1,4 +1,4 @@
-"""Peer: a test's own node beside the nodes under test, in whatever world they are."""
+"""Peer: a test's own node beside the nodes under test, on whatever platform they are."""
 
 import warnings
 from collections.abc import Callable, Mapping
@@ -17,7 +17,7 @@ from middleware_faults import MiddlewareLossError
 from teleop_core.bags.messages import discover, layout
 from teleop_core.base.parameters import specs
 from teleop_core.graph.topics import Topic
-from teleop_core.middleware.world import Executor, Node, Owner, Qos, World
+from teleop_core.middleware.platform import Executor, Node, Owner, Platform, Qos
 from teleop_core.nodes.observer import ReportReader
 from teleop_core.nodes.quality import profile
 from teleop_core.nodes.streams import Subscription, message_type
@@ -103,14 +103,14 @@ class AnyPeer:
     """Node of a test beside the nodes under test.
 
     Attributes:
-        world: Where it is.
+        platform: Where it is.
         ros: The node.
         executor: What serves it.
         observer: Who hears how nodes are.
         nodes: Processes that it has started.
     """
 
-    world: World
+    platform: Platform
     ros: Node
     executor: Executor
     observer: ReportReader
@@ -131,15 +131,15 @@ class AnyPeer:
 
     def now(self) -> float:
         """Time of a clock that never goes back [s]."""
-        return 1e-9 * self.world.monotonic_ns()
+        return 1e-9 * self.platform.monotonic_ns()
 
     def time_ns(self) -> int:
         """Time of the system's clock [ns]."""
-        return self.world.time_ns()
+        return self.platform.time_ns()
 
     def sleep(self, seconds: float) -> None:
         """Let time pass [s]: the rate of something, not a wait for it."""
-        self.world.sleep(seconds)
+        self.platform.sleep(seconds)
 
     # -- nodes -----------------------------------------------------------------------------------
 

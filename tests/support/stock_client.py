@@ -10,7 +10,7 @@ from sensor_msgs.msg import JointState
 
 from foreign_hand import stamp
 from teleop_core.kernels.geometry import Array
-from teleop_core.middleware.world import Qos
+from teleop_core.middleware.platform import Qos
 
 if TYPE_CHECKING:
     from peers import AnyPeer as Peer

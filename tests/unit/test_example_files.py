@@ -28,10 +28,10 @@ ROS = {
     "geometry_msgs.msg",
     "sensor_msgs.msg",
     "std_msgs.msg",
-    "teleop_core.middleware.world",
+    "teleop_core.middleware.platform",
     "teleop_drill.simulation.drill",
     "teleop_drill.simulation.stand_ins",
-    "teleop_drill.simulation.world",
+    "teleop_drill.simulation.platform",
     "teleop_drill.nodes.drill",
 }
 

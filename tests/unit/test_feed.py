@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from teleop_core.graph.graph import build_graph
-from teleop_core.middleware.ros import ROS, RosWorld
+from teleop_core.middleware.ros import ROS, RosPlatform
 from teleop_core.nodes.crews import Processes, crews
 from teleop_core.nodes.feed import MOST, Feed, FeedReader
 
@@ -18,7 +18,7 @@ NAMES = ("a", "b/c")
 NUMBERS = count()
 
 
-class Machine(RosWorld):
+class Machine(RosPlatform):
     """A world in which one recorder alone is found."""
 
     def __init__(self) -> None:
@@ -50,9 +50,9 @@ Ends = tuple[Feed, FeedReader, dict[str, Taker]]
 
 
 def made() -> Ends:
-    world = Machine()
+    platform = Machine()
     takers = {name: Taker() for name in NAMES}
-    reader, feed = FeedReader(takers, world), Feed(NAMES, world)
+    reader, feed = FeedReader(takers, platform), Feed(NAMES, platform)
     feed.flush()  # finds it
     for channel in feed.channels.values():
         channel.join(True)
@@ -154,7 +154,7 @@ def test_a_recorder_that_ends_costs_a_loop_nothing_and_the_next_one_is_found(
     assert not feed.is_open
     assert not feed.waiting
     monkeypatch.setattr("teleop_core.nodes.feed._AGAIN_NS", -1)
-    again = FeedReader(takers, feed.world)
+    again = FeedReader(takers, feed.platform)
     feed.flush()
     feed.channels["a"].give(b"y", 5)
     all_of(feed, again)
@@ -165,9 +165,9 @@ def test_a_recorder_that_ends_costs_a_loop_nothing_and_the_next_one_is_found(
 
 
 def test_a_second_recorder_of_a_machine_hears_no_loop_and_takes_none_away() -> None:
-    world, takers = Machine(), {name: Taker() for name in NAMES}
-    first, second = FeedReader(takers, world), FeedReader({}, world)
-    feed = Feed(NAMES, world)
+    platform, takers = Machine(), {name: Taker() for name in NAMES}
+    first, second = FeedReader(takers, platform), FeedReader({}, platform)
+    feed = Feed(NAMES, platform)
     feed.flush()
     feed.channels["a"].give(b"x", 1)
     feed.flush()
@@ -182,7 +182,7 @@ def test_a_second_recorder_of_a_machine_hears_no_loop_and_takes_none_away() -> N
 def test_bytes_that_are_no_feed_end_with_their_line(ends: Callable[[], Ends], sent: bytes) -> None:
     feed, reader, takers = ends()
     with socket.socket(socket.AF_UNIX) as other:
-        other.connect(feed.world.feed_place())
+        other.connect(feed.platform.feed_place())
         other.sendall(sent)
         reader.drain()
         assert other.recv(1) == b""  # it is heard no more

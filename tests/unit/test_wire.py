@@ -17,7 +17,7 @@ from teleop_core.graph import topics
 from teleop_core.kernels import records
 from teleop_core.kernels.fields import Cells
 from teleop_core.kernels.memory import integers
-from teleop_core.middleware.world import Taken
+from teleop_core.middleware.platform import Taken
 from teleop_core.nodes import wire
 from teleop_core.nodes.streams import READING, WRITING, Input, Output, calls_of, describe
 
@@ -61,7 +61,7 @@ class Queue:
             "matched": kind(self._matched),
             "clock": kind(self._clock),
         }
-        self.type, self.world, self.ros = None, self, self
+        self.type, self.platform, self.ros = None, self, self
         if is_reached:
             self.places = (1, self._message.ctypes.data, self._info.ctypes.data)
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 import teleop_core as tc
 from teleop_core.bags.ros_types import deserialise
 from teleop_core.graph.topics import Kind, Quality
-from teleop_core.middleware.world import World
+from teleop_core.middleware.platform import Platform
 from teleop_core_lerobot.side import SECOND_NS
 
 _TYPE = "sensor_msgs/msg/CompressedImage"
@@ -26,15 +26,15 @@ class LiveCamera:
 
     Args:
         topic: Name of the topic, such as ``camera/front/image_raw/compressed``, or of a camera of a scene: ``front``.
-        world: World of the session; None for ROS.
+        platform: Platform of the session; None for ROS.
 
     Attributes:
         topic: Full name of the topic.
     """
 
-    def __init__(self, topic: str, world: World | None = None) -> None:
+    def __init__(self, topic: str, platform: Platform | None = None) -> None:
         name = topic.strip("/")
-        self.topic, self._world = name if "/" in name else f"camera/{name}/image_raw/compressed", world
+        self.topic, self._platform = name if "/" in name else f"camera/{name}/image_raw/compressed", platform
         self._guest: Any = None
         self._data, self._stamp_ns, self._is_new = b"", -1, False
 
@@ -59,9 +59,9 @@ class LiveCamera:
             from teleop_core.nodes.streams import Subscription
         except ImportError as error:
             raise tc.TeleopError("live cameras need rclpy; pip install 'teleop_core[ros]' brings it") from error
-        if self._world is None:
+        if self._platform is None:
             choose_transport()
-        self._guest = Guest("lerobot_camera", world=self._world or ROS)
+        self._guest = Guest("lerobot_camera", platform=self._platform or ROS)
         self._data, self._stamp_ns, self._is_new = b"", -1, False
         topic = tc.Topic(self.topic, Kind.REPORT, quality=Quality.STREAM, message=_TYPE)
         self._taker = Subscription(self._guest, topic, f"/{self.topic}", _QUEUE)
@@ -92,7 +92,7 @@ class LiveCamera:
     def _age(self) -> float:
         if self._stamp_ns < 0:
             return float("inf")
-        return (self._listening.world.time_ns() - self._stamp_ns) / SECOND_NS
+        return (self._listening.platform.time_ns() - self._stamp_ns) / SECOND_NS
 
     def newest(self, oldest: float = float("inf")) -> Pixels:
         """Newest picture that has come, without waiting.
@@ -125,11 +125,11 @@ class LiveCamera:
             SessionError: It does not listen.
             TimeoutError: No new picture came in this time.
         """
-        world = self._listening.world
-        until_ns = world.monotonic_ns() + round(timeout * SECOND_NS)
+        platform = self._listening.platform
+        until_ns = platform.monotonic_ns() + round(timeout * SECOND_NS)
         self._take()
         while not self._is_new:
-            left = (until_ns - world.monotonic_ns()) / SECOND_NS
+            left = (until_ns - platform.monotonic_ns()) / SECOND_NS
             if left <= 0.0:
                 raise TimeoutError(f"no new picture came on {self.topic} in {timeout:g} s; is its camera running?")
             self._taker.wait(min(left, _TURN))

@@ -25,8 +25,8 @@ from teleop_core.evaluation.metrics.counts import PHASES
 from teleop_core.graph.graph import RECORDER_NAME
 from teleop_core.graph.topics import OPERATION, SLAVE_OPERATION, TELEOP_STATE
 from teleop_core.kernels.geometry import Array
+from teleop_core.middleware.platform import Platform, PlatformEndedError
 from teleop_core.middleware.ros import ROS
-from teleop_core.middleware.world import World, WorldEndedError
 from teleop_core.nodes.display import SEEN
 from teleop_core.nodes.observer import WARNING, ReportReader
 from teleop_core.nodes.operation import StopButton
@@ -51,7 +51,7 @@ class LiveLink(ReportReader):
         title: Name of the session.
         patience: Time in which an arm must be found [s].
         button: Stop button that may have been pressed before the arm was found; None for a new button.
-        world: World of the session.
+        platform: Platform of the session.
 
     Raises:
         SessionError: The domain has no arm, or an arm does not report its robot.
@@ -65,16 +65,16 @@ class LiveLink(ReportReader):
         title: str = "",
         patience: float = PATIENCE,
         button: StopButton | None = None,
-        world: World = ROS,
+        platform: Platform = ROS,
     ) -> None:
-        super().__init__(domain, "teleop_console", button, world, start_parameter_services=False)
+        super().__init__(domain, "teleop_console", button, platform, start_parameter_services=False)
         self.domain = domain
-        self._executor = self.world.executor()
+        self._executor = self.platform.executor()
         self._executor.add_node(self.ros)
         self._is_closed = False
-        self._thread = self.world.thread("console link", self._spin)
+        self._thread = self.platform.thread("console link", self._spin)
         self._thread.start()
-        self._lock, self._pressing = self.world.lock(), self.world.lock()
+        self._lock, self._pressing = self.platform.lock(), self.platform.lock()
         self._clients: dict[str, Any] = {}
         self._client, self._events = ParameterClient(self), ParameterEvents(self)
         self._known: dict[tuple[str, str], ParameterInfo] = {}
@@ -92,12 +92,12 @@ class LiveLink(ReportReader):
         self._executor.wake()
         self._thread.join(PATIENCE)
         self._executor.shutdown()
-        self.world.shutdown()
+        self.platform.shutdown()
         with suppress(Exception):  # the middleware may be shut down already
             self.ros.destroy_node()
 
     def _spin(self) -> None:
-        with suppress(WorldEndedError):
+        with suppress(PlatformEndedError):
             while not self._is_closed:
                 self._executor.spin_once(timeout_sec=0.1)
 
@@ -114,7 +114,7 @@ class LiveLink(ReportReader):
                     f"no arm answers on ROS domain {self.domain}; `teleop live` prints the domain of its "
                     "session; give it with --domain N"
                 )
-            self.world.sleep(0.02)
+            self.platform.sleep(0.02)
         self.arms = tuple(ShownArm(name, self._robot(name)) for name in sorted(names))
         self._seen = {arm.name: [NewestSample(self, t, arm) for t in SEEN] for arm in self.arms}
         told = {arm.name: [t.of_arm(arm.name) for t in (SLAVE_OPERATION, TELEOP_STATE)] for arm in self.arms}
@@ -186,7 +186,7 @@ class LiveLink(ReportReader):
         while (taken := self._marks.take()) is not None:
             with suppress(ValueError):  # the bytes may not be a report
                 for mark in read_reports(taken.data):
-                    ago = 1e-9 * (self.world.time_ns() - mark.stamp_ns)
+                    ago = 1e-9 * (self.platform.time_ns() - mark.stamp_ns)
                     view.marks = (*view.marks, (now_of(self) - self._begun - ago, mark.message))[-_MARKS:]
 
     def _hear_nodes(self, view: View) -> None:
@@ -218,7 +218,7 @@ class LiveLink(ReportReader):
             if name not in self._clients:
                 self._clients[name] = self.ros.create_client(Trigger, name)
         try:
-            answer = call(self.world, self._clients[name], Trigger.Request(), PATIENCE)
+            answer = call(self.platform, self._clients[name], Trigger.Request(), PATIENCE)
         except SessionError as error:
             return False, str(error)
         return bool(answer.success), str(answer.message)

@@ -11,7 +11,7 @@ from teleop_console.link import ArmView, ShownArm
 from teleop_core.bags.messages import Layout, layout, read_any
 from teleop_core.graph.topics import DISPLAY_MEASURED_CP, OPERATOR_BUTTONS, OPERATOR_JAW, OPERATOR_SERVO_CP, Topic
 from teleop_core.kernels.geometry import Array
-from teleop_core.middleware.world import Owner, Qos
+from teleop_core.middleware.platform import Owner, Qos
 from teleop_core.nodes.display import DisplayedStream
 from teleop_core.nodes.streams import message_type
 
@@ -26,7 +26,7 @@ _RHYTHM_NS = 3_000_000_000  # time over which the frames of a display are counte
 
 def now_of(owner: Owner) -> float:
     """Time of a clock that never goes back [s]."""
-    return 1e-9 * owner.world.monotonic_ns()
+    return 1e-9 * owner.platform.monotonic_ns()
 
 
 class NewestSample:
@@ -49,7 +49,7 @@ class NewestSample:
         found: Any = self._layout.decode_one(newest.data) or read_any(self.topic.kind, newest.data, self._joints)
         if not isinstance(found, tuple) or not np.isfinite(found[1]).all():
             return False  # the nodes that use the topic refuse and count wrong messages
-        now_ns = self._owner.world.time_ns()
+        now_ns = self._owner.platform.time_ns()
         self._waiting.append((now_ns, found[0], found[1].copy()))
         if not self._frames or self._frames[-1][1] != found[0]:
             self._frames.append((now_ns, found[0]))
@@ -57,7 +57,7 @@ class NewestSample:
 
     def rhythm(self) -> tuple[float, float]:
         """Number of new samples per second, and the delay of the newest sample [s]; NaN without recent samples."""
-        since_ns = self._owner.world.time_ns() - _RHYTHM_NS
+        since_ns = self._owner.platform.time_ns() - _RHYTHM_NS
         seen = [frame for frame in self._frames if frame[0] >= since_ns]
         if len(seen) < 2:
             return math.nan, math.nan
@@ -75,8 +75,8 @@ class Hand:
 
     def __init__(self, owner: Owner, arm: str) -> None:
         self._layout, self._pressed = layout(OPERATOR_SERVO_CP, ()), layout(OPERATOR_BUTTONS, ())
-        self._world = owner.world
-        self._lock, self._pressing = self._world.lock(), self._world.lock()
+        self._platform = owner.platform
+        self._lock, self._pressing = self._platform.lock(), self._platform.lock()
         self._publishers = [
             owner.ros.create_publisher(message_type(topic.kind.ros_type), f"/{topic.of_arm(arm).name}", Qos(depth=10))
             for topic in (OPERATOR_SERVO_CP, OPERATOR_BUTTONS, OPERATOR_JAW)
@@ -86,26 +86,26 @@ class Hand:
     def hold(self, pose: Array) -> None:
         """Command a pose of the stylus."""
         with self._lock:
-            data = self._layout.encode_one(self._world.time_ns(), np.asarray(pose, np.float64))
+            data = self._layout.encode_one(self._platform.time_ns(), np.asarray(pose, np.float64))
             self._publishers[0].publish(data)
 
     def press(self, name: str) -> None:
         """Press a button and release it after a short time; several presses are sent one after the other."""
-        self._world.thread("press", lambda: self._press(name)).start()
+        self._platform.thread("press", lambda: self._press(name)).start()
 
     def _press(self, name: str) -> None:
         with self._pressing, suppress(RuntimeError):  # rclpy, once the link is closed
             self._say(np.array([0.0, name == "fixture", name == "mode"]))
-            self._world.sleep(_PRESS)
+            self._platform.sleep(_PRESS)
             self._say(np.zeros(3))
             # keep the button released for the same time, so that two presses are not received as one
-            self._world.sleep(_PRESS)
+            self._platform.sleep(_PRESS)
 
     def close_jaw(self, share: float) -> None:
         """Command the closed share of the jaw, 0 to 1."""
         with self._lock:
-            self._publishers[2].publish(self._closed.encode_one(self._world.time_ns(), np.array([share])))
+            self._publishers[2].publish(self._closed.encode_one(self._platform.time_ns(), np.array([share])))
 
     def _say(self, pressed: Array) -> None:
         with self._lock:
-            self._publishers[1].publish(self._pressed.encode_one(self._world.time_ns(), pressed))
+            self._publishers[1].publish(self._pressed.encode_one(self._platform.time_ns(), pressed))

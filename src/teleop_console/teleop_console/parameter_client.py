@@ -8,8 +8,8 @@ from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters
 
 from teleop_console.link import ParameterInfo, Setting
 from teleop_core.base.errors import SessionError
+from teleop_core.middleware.platform import Client, Owner, Platform
 from teleop_core.middleware.ros_parameters import EVENTS, from_message, to_message
-from teleop_core.middleware.world import Client, Owner, World
 
 PATIENCE = 3.0
 """Time limit for a node's answer [s]."""
@@ -26,7 +26,7 @@ class ParameterEvents:
     """
 
     def __init__(self, owner: Owner) -> None:
-        self._lock = owner.world.lock()
+        self._lock = owner.platform.lock()
         self._changed: dict[tuple[str, str], Setting] = {}
         self._own = owner.ros.create_subscription(ParameterEvent, "/parameter_events", self._hear, EVENTS)
 
@@ -52,7 +52,7 @@ class ParameterClient:
     """
 
     def __init__(self, owner: Owner) -> None:
-        self._node, self._world = owner.ros, owner.world
+        self._node, self._platform = owner.ros, owner.platform
         self._clients: dict[tuple[type, str], Client] = {}
 
     def read(self, name: str) -> dict[str, ParameterInfo]:
@@ -95,10 +95,10 @@ class ParameterClient:
         key = (kind, f"/{name}/{service}")
         if key not in self._clients:
             self._clients[key] = self._node.create_client(kind, key[1])
-        return call(self._world, self._clients[key], request, PATIENCE)
+        return call(self._platform, self._clients[key], request, PATIENCE)
 
 
-def call(world: World, client: Client, request: object, patience: float) -> Any:
+def call(platform: Platform, client: Client, request: object, patience: float) -> Any:
     """Call a service from a thread other than the executor's, and return the answer.
 
     Raises:
@@ -106,7 +106,7 @@ def call(world: World, client: Client, request: object, patience: float) -> Any:
     """
     if not client.wait_for_service(timeout_sec=patience):
         raise SessionError(f"the service {client.srv_name} does not exist")
-    waits = world.lock()
+    waits = platform.lock()
     waits.acquire()
     asked = client.call_async(request)
     asked.add_done_callback(lambda _: waits.release())

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from teleop_core.bags.ros_types import deserialise
-from teleop_core.middleware.world import Owner, Qos, Taker
+from teleop_core.middleware.platform import Owner, Qos, Taker
 from teleop_core.nodes.streams import message_type
 
 TYPE = "sensor_msgs/msg/CompressedImage"
@@ -62,7 +62,7 @@ class PictureStreams:
 
     def take(self) -> dict[str, Picture]:
         """Newest picture of each camera, by the camera's name; cameras without a picture are missing."""
-        now = 1e-9 * self._owner.world.monotonic_ns()
+        now = 1e-9 * self._owner.platform.monotonic_ns()
         if now - self._looked > _LOOK:
             self._looked = now
             self._find()
@@ -72,7 +72,7 @@ class PictureStreams:
                 newest = taken.data
             if newest is not None and (found := picture_of(newest)) is not None:
                 self._newest[name] = found
-        now_ns = self._owner.world.time_ns()
+        now_ns = self._owner.platform.time_ns()
         return {name: Picture(*found, 1e-9 * (now_ns - found[2])) for name, found in self._newest.items()}
 
     def _find(self) -> None:

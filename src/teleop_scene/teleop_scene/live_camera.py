@@ -22,8 +22,8 @@ from teleop_core.coupling.network.presets import NetworkParameters
 from teleop_core.graph import TICK_NS
 from teleop_core.graph.topics import DIAGNOSTICS, SCENE_POSES, Topic
 from teleop_core.kernels import Array
+from teleop_core.middleware.platform import Platform, Publisher
 from teleop_core.middleware.ros import ROS
-from teleop_core.middleware.world import Publisher, World
 from teleop_core.nodes.discovery import choose_transport
 from teleop_core.nodes.guest import Guest
 from teleop_core.nodes.interrupt import Interrupt
@@ -63,7 +63,7 @@ class _Sender:
     """Publishes pictures when they arrive over the network."""
 
     def __init__(self, guest: Guest, views: Sequence[View], network: NetworkParameters | None, counts: Counts) -> None:
-        self._guest, self._counts, self._begin_ns = guest, counts, guest.world.monotonic_ns()
+        self._guest, self._counts, self._begin_ns = guest, counts, guest.platform.monotonic_ns()
         self._ways = [PictureWay(network, k) for k in range(len(views))]
         self._ticks, self._sent = [0] * len(views), [0] * len(views)
         self._made = [[self._publisher(topic) for topic in topics_of(view)] for view in views]
@@ -75,7 +75,7 @@ class _Sender:
         return self._guest.ros.create_publisher(message_type(topic.ros_type), f"/{topic.name}", profile(topic))
 
     def _now(self) -> int:
-        return (self._guest.world.monotonic_ns() - self._begin_ns) // TICK_NS
+        return (self._guest.platform.monotonic_ns() - self._begin_ns) // TICK_NS
 
     def _pass(self, k: int, size: int = 0) -> None:
         """Send a picture of camera ``k`` if it has a size, and let the time until now pass before it."""
@@ -106,7 +106,7 @@ class _Sender:
 
     def tell(self) -> None:
         """Publish the counts."""
-        self._reports.send(report(self._guest.world.time_ns(), NAME, 0, "active", self._counts.values()))
+        self._reports.send(report(self._guest.platform.time_ns(), NAME, 0, "active", self._counts.values()))
 
 
 class _Cameras:
@@ -115,7 +115,7 @@ class _Cameras:
     def __init__(
         self, guest: Guest, cameras: Sequence[Camera], rate: float, network: NetworkParameters | None, counts: Counts
     ) -> None:
-        self._cameras, self._rate, self._counts, self._world = cameras, rate, counts, guest.world
+        self._cameras, self._rate, self._counts, self._platform = cameras, rate, counts, guest.platform
         self._form, self._slot, self._told = layout(SCENE_POSES, ()), -1, 0
         self._poses = Subscription(guest, SCENE_POSES, f"/{SCENE_POSES.name}")
         self._sender = _Sender(guest, [camera.view for camera in cameras], network, counts)
@@ -124,7 +124,7 @@ class _Cameras:
     def turn(self) -> None:
         """Deliver what is due, then draw the newest poses if a period has begun."""
         self._sender.deliver()
-        if (now := self._world.monotonic_ns() // SECOND_NS) != self._told:
+        if (now := self._platform.monotonic_ns() // SECOND_NS) != self._told:
             self._told = now
             self._sender.tell()
         taken = self._poses.take()
@@ -159,7 +159,7 @@ def run(
     *,
     rate: float = 30.0,
     network: NetworkParameters | None = None,
-    world: World = ROS,
+    platform: Platform = ROS,
     interrupt: Interrupt | None = None,
     say: Callable[[str], object] = print,
 ) -> Counts:
@@ -170,7 +170,7 @@ def run(
         views: Cameras.
         rate: Pictures per second [Hz] of each camera; not above the rate of ``scene/poses``.
         network: Network on the way of the pictures; None: they arrive at once.
-        world: World of the session.
+        platform: Platform of the session.
         interrupt: Object that ends the cameras, in addition to signals of this process.
         say: Called with each line for the user.
 
@@ -186,10 +186,10 @@ def run(
     interrupt, counts = interrupt or Interrupt(), Counts()
     parent = Parent.of_environment()
     cameras = [Camera(file, view) for view in views]
-    if world is ROS:
+    if platform is ROS:
         choose_transport()
         os.nice(_NICE)
-    with interrupt.caught(), Guest(NAME, world=world) as guest:
+    with interrupt.caught(), Guest(NAME, platform=platform) as guest:
         work = _Cameras(guest, cameras, rate, network, counts)
         say(f"{len(cameras)} cameras of {file.name} at {rate:g} Hz: {', '.join(view.topic for view in views)}")
         try:

@@ -15,7 +15,7 @@ Work = Callable[[], object]
 
 
 class Timer:
-    """See :class:`~teleop_core.middleware.world.Timer`.
+    """See :class:`~teleop_core.middleware.platform.Timer`.
 
     A late call does not delay later calls, and missed calls are not made up. Calls of timers with a period below a
     second are at multiples of the period, so that all timers of one period wake the executor together.
@@ -103,7 +103,7 @@ class Agenda:
 
 
 class GuardCondition:
-    """See :class:`~teleop_core.middleware.world.GuardCondition`.
+    """See :class:`~teleop_core.middleware.platform.GuardCondition`.
 
     Args:
         agenda: Agenda of the node.

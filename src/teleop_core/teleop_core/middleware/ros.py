@@ -1,4 +1,4 @@
-"""ROS: the world of nodes that work in real time, on rclpy and the system's clock."""
+"""ROS: the platform of nodes that work in real time, on rclpy and the system's clock."""
 
 import gc
 import os
@@ -18,23 +18,23 @@ from rclpy.signals import SignalHandlerOptions
 
 from teleop_core.base.background import SYSTEM, Background
 from teleop_core.graph.layers import RealTimeParameters
-from teleop_core.middleware import real_time, ros_lifecycle, ros_node, ros_taking, world
+from teleop_core.middleware import platform, real_time, ros_lifecycle, ros_node, ros_taking
 from teleop_core.middleware.domains import checked_domain, domain_of_environment
+from teleop_core.middleware.platform import Node as LocalNode
 from teleop_core.middleware.ros_executor import RosExecutor
-from teleop_core.middleware.world import Node as LocalNode
 
 BAD_ARGUMENTS = (
     rclpy_implementation.RCLError,
     rclpy_implementation.UnknownROSArgsError,
     rclpy_implementation.RCLInvalidROSArgsError,
 )
-"""Exceptions that :meth:`RosWorld.init` and nodes raise if ROS cannot read its arguments."""
+"""Exceptions that :meth:`RosPlatform.init` and nodes raise if ROS cannot read its arguments."""
 _LOOPS = 64  # largest number of connections that wait to be accepted
 _CREDENTIALS = struct.Struct("3i")  # process, user, group
 
 
-class RosWorld:
-    """World in real time, with ROS as middleware.
+class RosPlatform:
+    """Platform in real time, with ROS as middleware.
 
     Args:
         context: Context of rclpy; None for the context of the whole process.
@@ -54,20 +54,20 @@ class RosWorld:
 
     functions = staticmethod(ros_taking.functions)
 
-    def lock(self) -> world.Lock:
-        """See :class:`~teleop_core.middleware.world.World`."""
+    def lock(self) -> platform.Lock:
+        """See :class:`~teleop_core.middleware.platform.Platform`."""
         return threading.Lock()
 
-    def thread(self, name: str, work: Callable[[], None]) -> world.Thread:
-        """See :class:`~teleop_core.middleware.world.World`."""
+    def thread(self, name: str, work: Callable[[], None]) -> platform.Thread:
+        """See :class:`~teleop_core.middleware.platform.Platform`."""
         return threading.Thread(target=work, name=name, daemon=True)
 
     def tidy(self) -> None:
-        """See :class:`~teleop_core.middleware.world.World`."""
+        """See :class:`~teleop_core.middleware.platform.Platform`."""
         gc.collect()  # compiling leaves millions of objects; one garbage collection of them takes seconds
 
-    def connect(self, place: str) -> world.Line:
-        """See :class:`~teleop_core.middleware.world.World`."""
+    def connect(self, place: str) -> platform.Line:
+        """See :class:`~teleop_core.middleware.platform.Platform`."""
         line = socket.socket(socket.AF_UNIX)
         line.setblocking(False)
         try:
@@ -77,32 +77,32 @@ class RosWorld:
             raise
         return line
 
-    def listen(self, place: str) -> world.Listener:
-        """See :class:`~teleop_core.middleware.world.World`."""
+    def listen(self, place: str) -> platform.Listener:
+        """See :class:`~teleop_core.middleware.platform.Platform`."""
         return _Listener(place)
 
     def feed_place(self) -> str:
-        """See :class:`~teleop_core.middleware.world.World`."""
+        """See :class:`~teleop_core.middleware.platform.Platform`."""
         return f"\0teleop_core.recorder.{os.environ.get('ROS_DOMAIN_ID') or 0}"
 
     def node(self, name: str, **options: Any) -> LocalNode:
-        """See :class:`~teleop_core.middleware.world.World`."""
+        """See :class:`~teleop_core.middleware.platform.Platform`."""
         return ros_node.RosNode(Node(name, context=self._context, **options))
 
-    def lifecycle_node(self, name: str, hooks: world.Hooks, **options: Any) -> world.LifecycleNode:
-        """See :class:`~teleop_core.middleware.world.World`."""
+    def lifecycle_node(self, name: str, hooks: platform.Hooks, **options: Any) -> platform.LifecycleNode:
+        """See :class:`~teleop_core.middleware.platform.Platform`."""
         return ros_lifecycle.RosLifecycleNode(name, hooks, **options)
 
-    def executor(self) -> world.Executor:
-        """See :class:`~teleop_core.middleware.world.World`."""
+    def executor(self) -> platform.Executor:
+        """See :class:`~teleop_core.middleware.platform.Platform`."""
         return RosExecutor(self._context)
 
-    def guest(self, domain: int | None = None) -> world.World:
-        """See :class:`~teleop_core.middleware.world.World`."""
+    def guest(self, domain: int | None = None) -> platform.Platform:
+        """See :class:`~teleop_core.middleware.platform.Platform`."""
         number = domain_of_environment() if domain is None else checked_domain("domain", domain)
         context = Context()
         context.init(args=[], domain_id=number)
-        return RosWorld(context)
+        return RosPlatform(context)
 
     def init(self, arguments: Sequence[str]) -> None:
         """Start the middleware with the arguments of a command line; signal handlers are not changed."""
@@ -110,7 +110,7 @@ class RosWorld:
         rclpy.init(args=list(arguments), signal_handler_options=SignalHandlerOptions.NO)
 
     def shutdown(self) -> None:
-        """See :class:`~teleop_core.middleware.world.World`."""
+        """See :class:`~teleop_core.middleware.platform.Platform`."""
         rclpy.utilities.try_shutdown(context=self._context)
 
     def ok(self) -> bool:
@@ -131,7 +131,7 @@ class _Listener:
             self._own.close()
             raise
 
-    def accept(self) -> world.Line | None:
+    def accept(self) -> platform.Line | None:
         """Next connection from a process of this user; None if there is none."""
         while True:
             try:
@@ -149,5 +149,5 @@ class _Listener:
         self._own.close()
 
 
-ROS = RosWorld()
-"""The world of a process that has one context of rclpy."""
+ROS = RosPlatform()
+"""The platform of a process that has one context of rclpy."""

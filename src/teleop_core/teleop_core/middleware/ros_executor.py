@@ -17,7 +17,7 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.utilities import get_default_context
 
 from teleop_core.middleware.agenda import NEVER_NS, Agenda
-from teleop_core.middleware.world import WorldEndedError
+from teleop_core.middleware.platform import PlatformEndedError
 
 _LOOK_NS = 1_000_000_000
 """Longest wait [ns]. After it rclpy looks for everything, also for events of publishers, such as a reader with
@@ -25,7 +25,7 @@ another QoS, which it logs."""
 
 
 class RosExecutor:
-    """See :class:`~teleop_core.middleware.world.Executor`.
+    """See :class:`~teleop_core.middleware.platform.Executor`.
 
     This class waits, and serves timers and deferred work. What comes from the middleware is served by rclpy.
 
@@ -42,13 +42,13 @@ class RosExecutor:
         self._has_more, self._look_ns = True, 0
 
     def add_node(self, node: Any) -> None:
-        """Add a node of :class:`~teleop_core.middleware.ros.RosWorld` to the nodes that this executor serves."""
+        """Add a node of :class:`~teleop_core.middleware.ros.RosPlatform` to the nodes that this executor serves."""
         self._own.add_node(node.own)
         node.agenda.wake = self.wake
         self._agendas.append(node.agenda)
 
     def spin_once(self, timeout_sec: float | None = None) -> None:
-        """Serve one event, or nothing if no event comes within the time [s]; raises WorldEndedError."""
+        """Serve one event, or nothing if no event comes within the time [s]; raises PlatformEndedError."""
         now_ns, was_woken = time.monotonic_ns(), False
         end_ns = NEVER_NS if timeout_sec is None else now_ns + round(timeout_sec * 1e9)
         while True:
@@ -64,7 +64,7 @@ class RosExecutor:
             until_ns = min(end_ns, self._look_ns, *(agenda.next_ns() for agenda in self._agendas))
             self._has_more, was_woken = self._entities.wait(max(0, until_ns - now_ns))
             if not self._context.ok():
-                raise WorldEndedError
+                raise PlatformEndedError
             now_ns = time.monotonic_ns()
 
     def _serve_middleware(self) -> bool:
@@ -74,7 +74,7 @@ class RosExecutor:
         except TimeoutException:
             return False
         except (ExternalShutdownException, ShutdownException) as error:
-            raise WorldEndedError from error
+            raise PlatformEndedError from error
         handler()
         if (failure := handler.exception()) is not None:
             raise failure

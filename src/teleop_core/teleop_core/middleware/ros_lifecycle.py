@@ -10,10 +10,10 @@ from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackRet
 from rclpy.parameter import Parameter
 
 from teleop_core.base import ParameterError, Spec, Value
+from teleop_core.middleware.platform import Hooks, Qos, TransitionResult
 from teleop_core.middleware.ros_node import RosNode, RosPublisher, profile_of
 from teleop_core.middleware.ros_parameters import declare, plain, typed
 from teleop_core.middleware.ros_taking import Unattended
-from teleop_core.middleware.world import Hooks, Qos, TransitionResult
 
 _CODES = {
     TransitionResult.SUCCESS: TransitionCallbackReturn.SUCCESS,
@@ -34,7 +34,7 @@ def _sim_time(node: str) -> ParameterError:
 
 
 class RosLifecycleNode(RosNode):
-    """See :class:`~teleop_core.middleware.world.LifecycleNode`.
+    """See :class:`~teleop_core.middleware.platform.LifecycleNode`.
 
     Args:
         name: Name of the node.

@@ -1,4 +1,4 @@
-"""Conversion of messages to bytes and back with ROS's own serializers, for every world."""
+"""Conversion of messages to bytes and back with ROS's own serializers, for every platform."""
 
 from typing import Any
 

@@ -14,8 +14,8 @@ from rclpy.service import Service
 from rclpy.subscription import Subscription
 
 from teleop_core.middleware.agenda import Agenda, GuardCondition, Timer
+from teleop_core.middleware.platform import Endpoint, Qos
 from teleop_core.middleware.ros_taking import RosTaker
-from teleop_core.middleware.world import Endpoint, Qos
 
 _DESTROY = {
     LifecyclePublisher: "destroy_lifecycle_publisher",
@@ -42,7 +42,7 @@ def profile_of(qos: Qos) -> QoSProfile:
 
 
 class RosPublisher:
-    """See :class:`~teleop_core.middleware.world.Publisher`.
+    """See :class:`~teleop_core.middleware.platform.Publisher`.
 
     Args:
         own: Publisher of rclpy.
@@ -81,7 +81,7 @@ class RosPublisher:
 
 
 class RosNode:
-    """See :class:`~teleop_core.middleware.world.Node`.
+    """See :class:`~teleop_core.middleware.platform.Node`.
 
     Args:
         own: Node of rclpy.

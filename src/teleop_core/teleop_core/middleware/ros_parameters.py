@@ -9,7 +9,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter, parameter_value_to_python
 
 from teleop_core.base.parameters import Spec, Value
-from teleop_core.middleware.world import Qos
+from teleop_core.middleware.platform import Qos
 
 EVENTS = Qos(depth=1000)
 """Quality of service of the topic on which nodes report changed parameters."""

@@ -15,7 +15,7 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
-from teleop_core.middleware.world import Taken
+from teleop_core.middleware.platform import Taken
 
 _OK = 0  # RCL_RET_OK
 _NOTHING = 401  # RCL_RET_SUBSCRIPTION_TAKE_FAILED

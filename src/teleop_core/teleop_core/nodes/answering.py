@@ -36,7 +36,7 @@ class AnsweringNode(CoreNode):
         assert self._question.subscription is not None
         # A delayed message becomes due even if no new message comes. Therefore the wait is short if there is a delay.
         self._question.subscription.wait(DT if self._question.delay else 0.1)
-        return (self.world.monotonic_ns(),)
+        return (self.platform.monotonic_ns(),)
 
     def tell(self) -> None:
         """Report the state after the last answer, if it has changed."""
@@ -63,7 +63,7 @@ class AnsweringNode(CoreNode):
         if is_silent and not self._was_silent:
             with self.lock:
                 self.stage.fall_silent()
-            self._told_ns = self.world.time_ns()
+            self._told_ns = self.platform.time_ns()
         self._was_silent = is_silent
 
     def answer(self, stamp_ns: int) -> None:
@@ -74,7 +74,7 @@ class AnsweringNode(CoreNode):
             self.stage.step()
         self.ports.send(stamp_ns)
         self.counts.ticks += 1
-        self.delay.put(self.world.time_ns() - stamp_ns)
+        self.delay.put(self.platform.time_ns() - stamp_ns)
 
     def concerns(self) -> list[str]:
         """Topics that are missing or silent."""

@@ -68,7 +68,7 @@ class ArmBridgeNode(TickingNode):
             if self.parameters.stamps == "sent":
                 stamp_ns = taken.sent_ns
             sample = Sample(message.name, message.position, message.velocity, message.effort, stamp_ns)
-            if self.stage.hear(sample, self.world.time_ns()) and self._has_server:
+            if self.stage.hear(sample, self.platform.time_ns()) and self._has_server:
                 self.ports.send_now(self._output, stamp_ns)
 
     def _command(self, now_ns: int) -> Command | None:

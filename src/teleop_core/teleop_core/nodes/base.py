@@ -11,7 +11,7 @@ from teleop_core.graph.signals import TICK_NS
 from teleop_core.graph.stage import STAGES, Stage, joints_of
 from teleop_core.graph.topics import Kind, Topic
 from teleop_core.graph.warming import warm_up
-from teleop_core.middleware.world import Publisher, TransitionResult
+from teleop_core.middleware.platform import Publisher, TransitionResult
 from teleop_core.nodes.diagnostics import Reporter, input_values, recent_values, tick_values
 from teleop_core.nodes.display import DisplayCopies
 from teleop_core.nodes.loop import LiveLoop, Loop, LoopNode
@@ -42,7 +42,7 @@ class CoreNode(LoopNode):
         """The running stage, the same object as :attr:`runner`; None for a node without a stage."""
         self.row: Any = None
         """The stage's signals, by the names of their fields."""
-        self.gate = self.world.lock()
+        self.gate = self.platform.lock()
         self.ended: Future[None] = Future()
         self.exit_code = 0
         self.has_ended = False
@@ -63,9 +63,9 @@ class CoreNode(LoopNode):
         self._word = "unconfigured"
         self._reporter, self._commanders = Reporter(self), Commanders(self, self.description)
         phase = report_phase(stage.name, tuple(STAGES), self.arm)
-        wait = (phase - 1e-9 * self.world.monotonic_ns()) % REPORT_PERIOD
+        wait = (phase - 1e-9 * self.platform.monotonic_ns()) % REPORT_PERIOD
         self._report_timer = self.ros.create_timer(wait, self._begin_reports)
-        self.ending = self.world.lock()
+        self.ending = self.platform.lock()
         """Locked while the end is being reported; all nodes of a process share this lock and ``ended``."""
 
     # -- what subclasses fill in -----------------------------------------------------------------
@@ -306,7 +306,7 @@ class CoreNode(LoopNode):
     # -- diagnostics -----------------------------------------------------------------------------
 
     def _fresh_counts(self) -> None:
-        self.schedule = Schedule(self.world.monotonic_ns, self.world.sleep, self.options.max_catch_up)
+        self.schedule = Schedule(self.platform.monotonic_ns, self.platform.sleep, self.options.max_catch_up)
         self.delay = Recent()  # time from the master's sample to this node's output, [ns]
 
     @property

@@ -11,7 +11,7 @@ from typing import Any
 
 from teleop_core.bags.messages import SECOND_NS
 from teleop_core.base.errors import TeleopError
-from teleop_core.middleware.world import Qos
+from teleop_core.middleware.platform import Qos
 from teleop_core.nodes.streams import message_type
 from teleop_core.slave.operation.states import COMMANDS, Answer
 
@@ -95,7 +95,7 @@ class OperatingStateTopics:
         stamp = message.header.stamp
         try:
             with self._node.lock:
-                aged = self._aged(stamp.sec * SECOND_NS + stamp.nanosec, self._node.world.time_ns())
+                aged = self._aged(stamp.sec * SECOND_NS + stamp.nanosec, self._node.platform.time_ns())
                 answer, text = (aged if name not in _STOPPING else None) or self._request(name)
         except TeleopError as error:
             log.warning(str(error))
@@ -108,7 +108,7 @@ class OperatingStateTopics:
 
     def _send(self) -> None:
         self._send_changes()
-        self._publish(self._node.world.time_ns(), self._condition())
+        self._publish(self._node.platform.time_ns(), self._condition())
 
     def _publish(self, stamp_ns: int, condition: Condition) -> None:
         message = self._kind(state=condition[0], is_homed=condition[1], is_busy=condition[2])
@@ -131,7 +131,7 @@ class Refusals:
     def add(self, topic: str, text: str) -> None:
         """Count a refused command."""
         self._counts[topic] = self._counts.get(topic, 0) + 1
-        now = 1e-9 * self._node.world.monotonic_ns()
+        now = 1e-9 * self._node.platform.monotonic_ns()
         if now - self._told.get(topic, -_QUIET) >= _QUIET:
             self._told[topic] = now
             self._node.ros.get_logger().warning(f"{topic}: {text}")

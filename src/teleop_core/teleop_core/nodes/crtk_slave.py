@@ -94,7 +94,7 @@ class CrtkSlave:
 
     def _commands(self) -> list[tuple[str, str, bool, Callable[[Any], Told]]]:
         """For each command: name, message type, whether it is streamed, and the function that processes it."""
-        motion, now = self._motion, self._node.world.time_ns
+        motion, now = self._motion, self._node.platform.time_ns
         return [
             ("move_jp", _JOINTS, False, lambda m: self._locked(motion.move, self._of(m))),
             ("move_jr", _JOINTS, False, lambda m: self._locked(motion.move_by, self._of(m))),
@@ -127,7 +127,7 @@ class CrtkSlave:
         try:
             stamp = message.header.stamp if hasattr(message, "header") else None
             stamp_ns = 0 if stamp is None else stamp.sec * SECOND_NS + stamp.nanosec
-            refusal = self._locked(self._motion.refusal_of_age, stamp_ns, self._node.world.time_ns())
+            refusal = self._locked(self._motion.refusal_of_age, stamp_ns, self._node.platform.time_ns())
             answer, text = refusal or command(message)
         except TeleopError as error:
             answer, text = Answer.REFUSED, f"refused: {error}"
@@ -160,7 +160,7 @@ class CrtkSlave:
         found = self._motion.solve(_transform(message))
         if isinstance(found, tuple):
             return found
-        return self._locked(self._motion.servo, found, self._node.world.time_ns(), Leader.INTERPOLATE_CP)
+        return self._locked(self._motion.servo, found, self._node.platform.time_ns(), Leader.INTERPOLATE_CP)
 
 
 class CommandError(TeleopError):

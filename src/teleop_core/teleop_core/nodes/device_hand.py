@@ -42,13 +42,13 @@ class DeviceHand:
         force: Callable[[], float],
     ) -> None:
         self._log, self._hand, self._force = node.ros.get_logger(), hand, force
-        self._world = node.world
+        self._platform = node.platform
         self._opens, self._parameters = opens, parameters
         self._pilot = Pilot(hand, parameters)
         self._device: Device | None = None
         self._lost, self._looks, self._last, self._felt = "", 0, 0.0, 0.0
         self._opened: Future[None] = Future()
-        self._loop = Loop(self._world, "device", self._turn, self._fail, self._open)
+        self._loop = Loop(self._platform, "device", self._turn, self._fail, self._open)
         self._loop.start()
         try:
             self._opened.result(_OPENING)
@@ -83,11 +83,11 @@ class DeviceHand:
             self._opened.set_exception(error)
             self._loop.is_running = False
             return
-        self._last = 1e-9 * self._world.monotonic_ns()
+        self._last = 1e-9 * self._platform.monotonic_ns()
         self._opened.set_result(None)
 
     def _turn(self) -> None:
-        self._world.sleep(PERIOD)
+        self._platform.sleep(PERIOD)
         if self._device is None:
             self._try_again()
         else:
@@ -97,7 +97,7 @@ class DeviceHand:
                 self._lose(str(error))
 
     def _read(self, device: Device) -> None:
-        now = 1e-9 * self._world.monotonic_ns()
+        now = 1e-9 * self._platform.monotonic_ns()
         elapsed, self._last = now - self._last, now
         self._pilot.step(device.read(), elapsed)
         self._looks += 1
@@ -109,13 +109,13 @@ class DeviceHand:
     def _lose(self, text: str) -> None:
         self._pilot.lose()
         self._lost, self._device = text, None
-        self._last = 1e-9 * self._world.monotonic_ns()
+        self._last = 1e-9 * self._platform.monotonic_ns()
         self._log.error(text)
 
     def _try_again(self) -> None:
-        if 1e-9 * self._world.monotonic_ns() - self._last < _AGAIN:
+        if 1e-9 * self._platform.monotonic_ns() - self._last < _AGAIN:
             return
-        self._last = 1e-9 * self._world.monotonic_ns()
+        self._last = 1e-9 * self._platform.monotonic_ns()
         try:
             self._device = self._opens(self._parameters)
         except TeleopError:

@@ -7,7 +7,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 
 from teleop_core.bags.messages import Refusal, report
 from teleop_core.graph.topics import DIAGNOSTICS
-from teleop_core.middleware.world import Owner
+from teleop_core.middleware.platform import Owner
 from teleop_core.nodes.quality import NO_OVERRIDES, profile
 from teleop_core.nodes.rate import Recent, TickCounts
 from teleop_core.nodes.sender import Sender
@@ -27,19 +27,19 @@ class Reporter:
     """
 
     def __init__(self, owner: Owner) -> None:
-        self._owner, self._world = owner, owner.world
+        self._owner, self._platform = owner, owner.platform
         name, overrides = f"/{DIAGNOSTICS.name}", getattr(owner, "overrides", NO_OVERRIDES)
         self._publisher = owner.ros.create_publisher(
             DiagnosticArray, name, overrides.apply(name, "publisher", profile(DIAGNOSTICS))
         )
-        self._last_ns, self._last_ticks, self._elapsed = self._world.monotonic_ns(), 0, 1.0
+        self._last_ns, self._last_ticks, self._elapsed = self._platform.monotonic_ns(), 0, 1.0
         self._last_refused: dict[Input, Counter[Refusal]] = {}
         self._last_received: dict[Input, int] = {}
-        self._offset_ns = self._world.time_ns() - self._world.monotonic_ns()
+        self._offset_ns = self._platform.time_ns() - self._platform.monotonic_ns()
 
     def clock_step(self) -> float:
         """Step of the system's clock since the last call [s]; 0 if it was not stepped."""
-        offset_ns = self._world.time_ns() - self._world.monotonic_ns()
+        offset_ns = self._platform.time_ns() - self._platform.monotonic_ns()
         step_ns, self._offset_ns = offset_ns - self._offset_ns, offset_ns
         return step_ns * 1e-9 if abs(step_ns) > _STEP_NS else 0.0
 
@@ -49,7 +49,7 @@ class Reporter:
 
     def rate(self, ticks: int) -> float:
         """Ticks per second since the last call."""
-        now_ns = self._world.monotonic_ns()
+        now_ns = self._platform.monotonic_ns()
         self._elapsed = max(1e-9 * (now_ns - self._last_ns), 1e-3)
         rate = (ticks - self._last_ticks) / self._elapsed
         self._last_ns, self._last_ticks = now_ns, max(ticks, 0)
@@ -85,7 +85,7 @@ class Reporter:
         """Publish one status: a warning if there are concerns."""
         name = f"{self._owner.ros.get_namespace()}/{self._owner.ros.get_name()}".strip("/")
         level, message = (WARNING, "; ".join(concerns)) if concerns else (OK, text)
-        now_ns = self._world.time_ns()
+        now_ns = self._platform.time_ns()
         self._publisher.publish(report(now_ns, name, level, message, values, "teleop_core"))
 
 

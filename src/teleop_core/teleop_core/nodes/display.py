@@ -26,7 +26,7 @@ from teleop_core.graph.topics import (
     TASK_STATE,
     Topic,
 )
-from teleop_core.middleware.world import Owner, Taken
+from teleop_core.middleware.platform import Owner, Taken
 from teleop_core.nodes.streams import Output, Subscription
 
 SEEN = (
@@ -91,7 +91,7 @@ class DisplayedStream:
 
     def __init__(self, owner: Owner, topic: Topic) -> None:
         self._owner, self._topic = owner, topic
-        self._name, self._since_ns = displayed(topic).name, owner.world.monotonic_ns()
+        self._name, self._since_ns = displayed(topic).name, owner.platform.monotonic_ns()
         self._subscription = Subscription(owner, topic, self._name, 1)
 
     def take(self) -> Taken | None:
@@ -99,7 +99,7 @@ class DisplayedStream:
         newest = None
         while (taken := self._subscription.take()) is not None:
             newest = taken
-        now_ns, is_copy = self._owner.world.monotonic_ns(), self._name != f"/{self._topic.name}"
+        now_ns, is_copy = self._owner.platform.monotonic_ns(), self._name != f"/{self._topic.name}"
         if newest is None and is_copy and now_ns - self._since_ns > _SILENCE_NS:
             self._since_ns = now_ns
             if not self._owner.ros.count_publishers(self._name):

@@ -16,7 +16,7 @@ import numpy as np
 
 from teleop_core.kernels import records
 from teleop_core.kernels.fields import Cells, fields_of
-from teleop_core.middleware.world import Line, Listener, World
+from teleop_core.middleware.platform import Line, Listener, Platform
 from teleop_core.nodes.wire import Block
 
 MOST = 16 << 20
@@ -63,7 +63,7 @@ class Channel:
         """Tell a new recorder whether this process sends the topic."""
         if self._feed.is_open:
             word = _JOINED if self._is_inside else _LEFT
-            self._feed.put(self.index, word, time_ns=self._feed.world.time_ns())
+            self._feed.put(self.index, word, time_ns=self._feed.platform.time_ns())
 
 
 class Feed:
@@ -71,17 +71,17 @@ class Feed:
 
     Args:
         names: Topics that the loop may send, with the names that the recorder uses.
-        world: World of the loop.
+        platform: Platform of the loop.
 
     Attributes:
-        world: As given.
+        platform: As given.
         channels: Channel of each topic, by its name.
         waiting: Queued bytes that are not written yet.
         block: Record of :class:`~teleop_core.nodes.wire.Block`: messages that kernels have fed since the last flush.
     """
 
-    def __init__(self, names: Iterable[str], world: World) -> None:
-        self._names, self.world = tuple(names), world
+    def __init__(self, names: Iterable[str], platform: Platform) -> None:
+        self._names, self.platform = tuple(names), platform
         self._line: Line | None = None
         self._looked_ns = -_AGAIN_NS
         self.waiting = bytearray()
@@ -113,7 +113,7 @@ class Feed:
     def flush(self) -> None:
         """Write as much of the queue as the socket accepts; at intervals, look for a recorder."""
         if self._line is None and self._names:
-            now_ns = self.world.monotonic_ns()
+            now_ns = self.platform.monotonic_ns()
             if now_ns - self._looked_ns > _AGAIN_NS:
                 self._looked_ns = now_ns
                 self._connect()
@@ -148,7 +148,7 @@ class Feed:
 
     def _connect(self) -> None:
         try:
-            line = self.world.connect(self.world.feed_place())
+            line = self.platform.connect(self.platform.feed_place())
         except OSError:  # no recorder listens
             return
         self._line, self.block["is_open"] = line, 1
@@ -172,23 +172,23 @@ class FeedReader:
 
     Args:
         channels: Receiver of the messages of each topic, by its name.
-        world: World of the recorder. If another recorder already listens in it, this one gets no feeds.
+        platform: Platform of the recorder. If another recorder already listens in it, this one gets no feeds.
 
     Attributes:
         cut: Number of feeds that ended without notice: the queued messages of a killed process are lost.
     """
 
-    def __init__(self, channels: Mapping[str, Fed], world: World) -> None:
-        self._channels, self._world, self.cut = channels, world, 0
+    def __init__(self, channels: Mapping[str, Fed], platform: Platform) -> None:
+        self._channels, self._platform, self.cut = channels, platform, 0
         self._loops: list[_Source] = []
         self._opened: Listener | None = None
         with suppress(OSError):
-            self._opened = world.listen(world.feed_place())
+            self._opened = platform.listen(platform.feed_place())
 
     def drain(self) -> None:
         """Pass on all messages that have arrived."""
         while self._opened is not None and (line := self._opened.accept()) is not None:
-            self._loops.append(_Source(line, self._channels, self._world))
+            self._loops.append(_Source(line, self._channels, self._platform))
         for one in self._loops:
             one.drain()
         self.cut += sum(not (one.is_open or one.has_ended) for one in self._loops)
@@ -206,8 +206,8 @@ class FeedReader:
 class _Source:
     """Feed of one loop. When it ends, other senders may send its topics."""
 
-    def __init__(self, line: Line, channels: Mapping[str, Fed], world: World) -> None:
-        self._line, self._known, self._world, self._came = line, channels, world, bytearray()
+    def __init__(self, line: Line, channels: Mapping[str, Fed], platform: Platform) -> None:
+        self._line, self._known, self._platform, self._came = line, channels, platform, bytearray()
         self._channels: list[Fed | None] = []
         self._last: dict[int, int] = {}
         self.is_open, self.has_ended = True, False
@@ -234,7 +234,7 @@ class _Source:
         self.is_open = False
         for channel in self._channels:
             if channel is not None:
-                channel.join(False, self._world.time_ns())
+                channel.join(False, self._platform.time_ns())
 
     def _hand_on(self) -> None:
         """Pass on whole frames. A sender of malformed frames is not a loop of this package; it is disconnected."""

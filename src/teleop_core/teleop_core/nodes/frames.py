@@ -151,8 +151,8 @@ class FramesNode(SessionNode):
 
     def due(self) -> Sequence[int]:
         """Wait for the next copies."""
-        self.world.sleep(PERIOD_NS * 1e-9)
-        return (self.world.monotonic_ns(),)
+        self.platform.sleep(PERIOD_NS * 1e-9)
+        return (self.platform.monotonic_ns(),)
 
     def step(self, tick_ns: int) -> None:
         """Publish what is due. The robots are described even without subscribers, once their joints are known."""

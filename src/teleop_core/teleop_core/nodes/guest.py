@@ -2,9 +2,9 @@
 
 from typing import Any, Self
 
+from teleop_core.middleware.platform import Platform
 from teleop_core.middleware.ros import ROS
 from teleop_core.middleware.ros_type_support import spare_generator
-from teleop_core.middleware.world import World
 
 spare_generator()  # must be called before the first node is made
 
@@ -15,17 +15,17 @@ class Guest:
     Args:
         name: Name of the node.
         domain: ROS domain; None for the domain of the environment.
-        world: World of the session.
+        platform: Platform of the session.
         options: Further options of the node, as in rclpy.
 
     Attributes:
-        world: World of the guest.
+        platform: Platform of the guest.
         ros: The node.
     """
 
-    def __init__(self, name: str, domain: int | None = None, world: World = ROS, **options: Any) -> None:
-        self.world = world.guest(domain)
-        self.ros = self.world.node(name, use_global_arguments=False, enable_rosout=False, **options)
+    def __init__(self, name: str, domain: int | None = None, platform: Platform = ROS, **options: Any) -> None:
+        self.platform = platform.guest(domain)
+        self.ros = self.platform.node(name, use_global_arguments=False, enable_rosout=False, **options)
 
     def __enter__(self) -> Self:
         return self
@@ -36,4 +36,4 @@ class Guest:
     def close(self) -> None:
         """Destroy the node."""
         self.ros.destroy_node()
-        self.world.shutdown()
+        self.platform.shutdown()

@@ -63,7 +63,7 @@ class CrtkMaster:
 
     def _note(self) -> None:
         if self._topics is not None:
-            self._topics.note(self._node.world.time_ns())
+            self._topics.note(self._node.platform.time_ns())
 
     def _condition(self) -> Condition:
         return (State.FAULT if self._is_stopped else self._state).name, True, False

@@ -9,10 +9,10 @@ from rcl_interfaces.srv import GetParameters, ListParameters, SetParameters
 from std_srvs.srv import Trigger
 
 from teleop_core.base.errors import ParameterError, SessionError, UnknownNameError
+from teleop_core.middleware.platform import Platform, Qos, Taken, Taker
 from teleop_core.middleware.ros import ROS
 from teleop_core.middleware.ros_messages import read_message
 from teleop_core.middleware.ros_parameters import from_message, to_message
-from teleop_core.middleware.world import Qos, Taken, Taker, World
 from teleop_core.nodes.guest import Guest
 from teleop_core.nodes.streams import message_type
 
@@ -47,13 +47,13 @@ class LookingNode(Guest):
     Args:
         domain: ROS domain.
         patience: Longest time for discovery and for an answer [s].
-        world: World of the session.
+        platform: Platform of the session.
     """
 
-    def __init__(self, domain: int, patience: float = 3.0, world: World = ROS) -> None:
-        super().__init__("teleop_look", domain, world, start_parameter_services=False)
+    def __init__(self, domain: int, patience: float = 3.0, platform: Platform = ROS) -> None:
+        super().__init__("teleop_look", domain, platform, start_parameter_services=False)
         self.domain, self._patience = domain, patience
-        self._executor = self.world.executor()
+        self._executor = self.platform.executor()
         self._executor.add_node(self.ros)
 
     def close(self) -> None:
@@ -179,7 +179,7 @@ class LookingNode(Guest):
     # -- waiting -----------------------------------------------------------------------------------
 
     def _now(self) -> float:
-        return 1e-9 * self.world.monotonic_ns()
+        return 1e-9 * self.platform.monotonic_ns()
 
     def _discovered(self, look: Callable[[], list[tuple[str, list[str]]]]) -> dict[str, list[str]]:
         """Names and types, once nothing new has been found for a while."""

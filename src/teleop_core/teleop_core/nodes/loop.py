@@ -15,7 +15,7 @@ from teleop_core.base.errors import TeleopError
 from teleop_core.evaluation.metrics.counts import PHASES
 from teleop_core.graph.stage import Stage
 from teleop_core.graph.topics import Kind
-from teleop_core.middleware.world import World
+from teleop_core.middleware.platform import Platform
 from teleop_core.nodes.feed import Feed
 from teleop_core.nodes.ports import Ports
 from teleop_core.nodes.rate import Phases, Schedule
@@ -30,7 +30,7 @@ class Loop:
     """Thread that makes one turn after another until it is stopped.
 
     Args:
-        world: World of the loop.
+        platform: Platform of the loop.
         name: Name of the thread.
         turn: Makes one turn; blocks for at most a tenth of a second.
         fail: Called when a turn failed and the loop has ended, with the reason and whether it was expected.
@@ -49,7 +49,7 @@ class Loop:
 
     def __init__(
         self,
-        world: World,
+        platform: Platform,
         name: str,
         turn: Callable[[], None],
         fail: Callable[[str, bool], None],
@@ -59,8 +59,8 @@ class Loop:
         self.name, self.turns, self.patience = name, 0, patience
         self.is_ready = self.is_hung = False
         self._turn, self._fail, self._prepare = turn, fail, prepare
-        self.is_running, self._world = True, world
-        self._thread = world.thread(name, self._run)
+        self.is_running, self._platform = True, platform
+        self._thread = platform.thread(name, self._run)
 
     def start(self) -> None:
         """Start the thread."""
@@ -69,7 +69,7 @@ class Loop:
     def stop(self) -> bool:
         """End after the current turn; returns whether the loop has ended. A loop that hangs is abandoned."""
         self.is_running = False
-        if self._world.thread_ident() == self._thread.ident:
+        if self._platform.thread_ident() == self._thread.ident:
             return True
         self._thread.join(0.0 if self.is_hung else _END_PATIENCE)
         return not self._thread.is_alive()
@@ -140,7 +140,7 @@ class LoopNode(TunedNode):
     def prepare(self) -> None:
         """Apply the real-time options to the calling thread; log the options that the system refuses."""
         options = self.options.real_time
-        refusals = self.world.take_real_time(options)
+        refusals = self.platform.take_real_time(options)
         for refusal in refusals:
             self.ros.get_logger().warning(refusal)
         if options.priority > 0 and not any("priority" in refusal for refusal in refusals):
@@ -151,7 +151,9 @@ class LoopNode(TunedNode):
         again = replace(self.options.real_time, cpus=(), lock_memory=False, freeze_gc=False)
         warn = self.ros.get_logger().warning
         # A log line takes milliseconds, too long for the loop.
-        return Strain(self.world, lambda: self.world.take_real_time(again), lambda text: self.ros.defer(warn, text))
+        return Strain(
+            self.platform, lambda: self.platform.take_real_time(again), lambda text: self.ros.defer(warn, text)
+        )
 
 
 class LiveLoop(Loop):
@@ -185,11 +187,11 @@ class LiveLoop(Loop):
         taps: Callable[[], Mapping[str, Tap]] | None = None,
     ) -> None:
         last = nodes[-1]
-        super().__init__(last.world, name, self._work, fail, patience=last.patience)
-        self.nodes, self._crew, self._gate = nodes, (*beside, *nodes), last.world.lock()
+        super().__init__(last.platform, name, self._work, fail, patience=last.patience)
+        self.nodes, self._crew, self._gate = nodes, (*beside, *nodes), last.platform.lock()
         self._schedule, self._due = (last.schedule, last.due) if schedule is None else (schedule, schedule.due)
         self._taps = taps
-        self._feed = Feed(_fed(nodes) if taps is None else (), last.world)
+        self._feed = Feed(_fed(nodes) if taps is None else (), last.platform)
         self._at_work: tuple[bool, ...] = ()
         self.phases, self.tick_ns, self.newest_ns, self.progress = Phases(*PHASES), 0, 0, 0
         for node in nodes:
@@ -202,15 +204,15 @@ class LiveLoop(Loop):
             self._feed.close()
         else:
             for node in self.nodes:  # the nodes end without waiting for the loop
-                node.gate = self._world.lock()
+                node.gate = self._platform.lock()
         return has_ended
 
     def _work(self) -> None:
         """Make all ticks that are due: take, step, give, tell. The gate keeps all nodes open during a tick."""
-        clock = self._world.monotonic_ns
+        clock = self._platform.monotonic_ns
         self.progress += 1
         if not self._has_work():
-            self._world.sleep(0.01)
+            self._platform.sleep(0.01)
             self._schedule.start()
             return
         ticks = self._due()

@@ -40,9 +40,9 @@ class LiveMarkers:
     def __init__(self, node: CoreNode, arm: str, axes: Array | None = None) -> None:
         self._topics = {topic: topic.of_arm(arm) for topic in _READ}
         self.read = tuple(self._topics.values())
-        self._drawn, self._cadence = (ArmMarkers(arm, axes), Cadence(node.world.monotonic_ns, PERIOD_NS))
+        self._drawn, self._cadence = (ArmMarkers(arm, axes), Cadence(node.platform.monotonic_ns, PERIOD_NS))
         self._publisher = node.open_publisher(absolute(MARKERS.of_arm(arm)))
-        self._time_ns = node.world.time_ns
+        self._time_ns = node.platform.time_ns
 
     @property
     def is_watched(self) -> bool:

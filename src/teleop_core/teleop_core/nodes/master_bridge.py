@@ -55,8 +55,8 @@ class MasterBridgeNode(TickingNode):
         now_ns = self.epoch_ns + tick_ns
         with self.lock:
             is_new = self._listen()
-            is_heard = self.stage.is_heard(self.world.time_ns())
-            force = self.stage.force(self.input(MASTER_SERVO_CF).age(), self.world.time_ns())
+            is_heard = self.stage.is_heard(self.platform.time_ns())
+            force = self.stage.force(self.input(MASTER_SERVO_CF).age(), self.platform.time_ns())
         if is_new or (is_heard and now_ns - self._said_ns >= _BUTTONS_AGAIN_NS):
             self.ports.send_now(self._buttons_out, now_ns)
             self._said_ns = now_ns
@@ -86,7 +86,7 @@ class MasterBridgeNode(TickingNode):
         return is_new
 
     def _hear(self, message: Any, stamp_ns: int) -> bool:
-        now_ns = self.world.time_ns()
+        now_ns = self.platform.time_ns()
         if self.parameters.pose_message == RATE_MESSAGE:
             return bool(self.stage.hear_joy(message.axes, message.buttons, stamp_ns, now_ns))
         if self.parameters.says_joints:

@@ -33,7 +33,7 @@ class NetworkNode(TickingNode):
         if loop is not None and len(loop.nodes) == 1:  # else packets come from this process, with the tick's time
             if loop.tick_ns != loop.newest_ns:
                 return
-            self.stage.state["behind"] = (self.world.monotonic_ns() - loop.tick_ns) // TICK_NS
+            self.stage.state["behind"] = (self.platform.monotonic_ns() - loop.tick_ns) // TICK_NS
         super().take()
 
     def send(self, now_ns: int) -> None:

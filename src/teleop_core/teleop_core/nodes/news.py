@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterable
 
 from teleop_core.graph.stage import Stage
-from teleop_core.middleware.world import Owner
+from teleop_core.middleware.platform import Owner
 from teleop_core.nodes.streams import Input
 
 _CALM_NS = 1_000_000_000  # shortest time between two log lines about trouble [ns]
@@ -75,7 +75,7 @@ class Trouble:
         """Log current problems that are not logged yet; returns at once."""
         text = "; ".join(concerns)
         words = re.sub(r"[\d.]+", "", text)
-        now_ns = self._owner.world.monotonic_ns()
+        now_ns = self._owner.platform.monotonic_ns()
         if words == self._told or now_ns - self._told_ns < _CALM_NS:
             return
         self._told, self._told_ns = words, now_ns

@@ -6,8 +6,8 @@ from typing import Any
 
 from teleop_core.bags.messages import read_reports
 from teleop_core.graph.topics import DIAGNOSTICS
+from teleop_core.middleware.platform import Platform
 from teleop_core.middleware.ros import ROS
-from teleop_core.middleware.world import World
 from teleop_core.nodes.guest import Guest
 from teleop_core.nodes.operation import StopButton
 from teleop_core.nodes.streams import Subscription
@@ -40,7 +40,7 @@ class ReportReader(Guest):
         domain: ROS domain.
         name: Name of its node.
         button: Stop button to use, which outlives the observer; None makes a new button.
-        world: World of the session.
+        platform: Platform of the session.
         options: Further options of the node, as in rclpy.
 
     Attributes:
@@ -54,10 +54,10 @@ class ReportReader(Guest):
         domain: int,
         name: str = "teleop_live",
         button: StopButton | None = None,
-        world: World = ROS,
+        platform: Platform = ROS,
         **options: Any,
     ) -> None:
-        super().__init__(name, domain, world, **options)
+        super().__init__(name, domain, platform, **options)
         self.statuses: dict[str, Status] = {}
         self.malformed, self.has_heartbeat = 0, False
         self._reports = Subscription(self, DIAGNOSTICS, f"/{DIAGNOSTICS.name}", 100)
@@ -85,7 +85,9 @@ class ReportReader(Guest):
                 self.malformed += 1
                 continue
             for one in reports:
-                self.statuses[one.name] = Status(one.level, one.message, one.values, 1e-9 * self.world.monotonic_ns())
+                self.statuses[one.name] = Status(
+                    one.level, one.message, one.values, 1e-9 * self.platform.monotonic_ns()
+                )
                 is_new = True
         return is_new
 

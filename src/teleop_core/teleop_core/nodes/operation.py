@@ -7,7 +7,7 @@ from typing import Any, Protocol
 from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
 
-from teleop_core.middleware.world import Owner, Qos
+from teleop_core.middleware.platform import Owner, Qos
 from teleop_core.nodes.streams import RareTakers
 from teleop_core.slave.operation.presses import Presses
 from teleop_core.slave.operation.states import COMMANDS, Answer
@@ -43,7 +43,7 @@ class StopButton:
     """
 
     def __init__(self, owner: Owner) -> None:
-        self._world = owner.world
+        self._platform = owner.platform
         self._own = owner.ros.create_publisher(Bool, STOP_TOPIC, Qos(depth=1, is_latched=True))
         self._is_pressed: bool | None = None
         self._said_ns = 0
@@ -63,12 +63,12 @@ class StopButton:
 
         A slave with ``operation.heartbeat`` counts the silence of a known button as a press.
         """
-        silence_ns = self._world.monotonic_ns() - self._said_ns
+        silence_ns = self._platform.monotonic_ns() - self._said_ns
         if self._is_pressed is not None and silence_ns > _BEAT_NS:
             self._say(self._is_pressed)
 
     def _say(self, is_pressed: bool) -> None:
-        self._is_pressed, self._said_ns = is_pressed, self._world.monotonic_ns()
+        self._is_pressed, self._said_ns = is_pressed, self._platform.monotonic_ns()
         self._own.publish(Bool(data=is_pressed))
 
     @property
@@ -96,12 +96,12 @@ class StopInput:
 
     def __init__(self, owner: Owner) -> None:
         self._ros, self.has_new = owner.ros, False
-        self._now_ns = owner.world.monotonic_ns
+        self._now_ns = owner.platform.monotonic_ns
         self._found_ns: dict[bytes, int] = {}  # buttons that have sent nothing yet
         self._silent: tuple[bytes, ...] = ()
         self._timer = self._ros.create_timer(_LOOK, self._look_for_silent)
         self._takers = [self._ros.create_taker(Bool, STOP_TOPIC, qos) for qos in READERS]
-        self._rare = RareTakers(owner.world, self._takers)
+        self._rare = RareTakers(owner.platform, self._takers)
         self._presses, self._ticks = Presses(), 0
         self._names: dict[bytes, str] = {}
 

@@ -12,7 +12,7 @@ from teleop_core.bags.messages import Refusal
 from teleop_core.bags.ros_types import deserialise
 from teleop_core.graph.stage import STAGES
 from teleop_core.graph.topics import SLAVE_SERVO_JP, Topic
-from teleop_core.middleware.world import Qos, Taker, Timer
+from teleop_core.middleware.platform import Qos, Taker, Timer
 from teleop_core.nodes.crtk import Refusals
 from teleop_core.nodes.streams import message_type
 

@@ -14,8 +14,8 @@ from teleop_core.bags.reader import Bag
 from teleop_core.bags.transforms import ROBOT_DESCRIPTION, TF
 from teleop_core.base.errors import ParameterError, RecordingError
 from teleop_core.graph.topics import BY_NAME, Quality
+from teleop_core.middleware.platform import Platform, Qos
 from teleop_core.middleware.ros import ROS
-from teleop_core.middleware.world import Qos, World
 from teleop_core.nodes.discovery import choose_transport
 from teleop_core.nodes.guest import Guest
 from teleop_core.nodes.interrupt import Interrupt
@@ -34,7 +34,7 @@ def play(
     topics: Iterable[str] | None,
     rate: float,
     console: Console,
-    world: World = ROS,
+    platform: Platform = ROS,
     interrupt: Interrupt | None = None,
 ) -> int:
     """Publish a recording with its original bytes and time intervals, until its end or an ending signal.
@@ -44,7 +44,7 @@ def play(
         topics: Topics to publish; None for all, except ``/tf`` if its type is not installed.
         rate: Speed relative to real time, > 0.
         console: Console that shows the progress, if it is a terminal.
-        world: World in which the recording is published.
+        platform: Platform in which the recording is published.
         interrupt: Object that ends the playback, in addition to signals of this process.
 
     Returns:
@@ -61,11 +61,11 @@ def play(
     if topics is None:
         names = [name for name in bag.topics if name != TF.name or _is_installed(bag, name)]
     sent, interrupt = 0, interrupt or Interrupt()
-    with interrupt.caught(), _publishers(bag, names, world) as publishers, _progress(bag, console) as show:
-        begin_ns = world.monotonic_ns() + _DISCOVERY_NS
+    with interrupt.caught(), _publishers(bag, names, platform) as publishers, _progress(bag, console) as show:
+        begin_ns = platform.monotonic_ns() + _DISCOVERY_NS
         try:
             for name, _, log_ns, data in bag.raw(names):
-                _sleep_until(begin_ns + round((log_ns - bag.start_ns) / rate), world, interrupt)
+                _sleep_until(begin_ns + round((log_ns - bag.start_ns) / rate), platform, interrupt)
                 publishers[name].publish(data)
                 sent += 1
                 show(log_ns)
@@ -74,22 +74,22 @@ def play(
     return sent
 
 
-def _sleep_until(time_ns: int, world: World, interrupt: Interrupt) -> None:
+def _sleep_until(time_ns: int, platform: Platform, interrupt: Interrupt) -> None:
     """Sleep until a time of the monotonic clock, unless a signal comes."""
     while True:
         interrupt.check()
-        ahead_ns = time_ns - world.monotonic_ns()
+        ahead_ns = time_ns - platform.monotonic_ns()
         if ahead_ns <= _EARLY_NS:
             return
-        world.sleep(min(1e-9 * ahead_ns, 0.1))
+        platform.sleep(min(1e-9 * ahead_ns, 0.1))
 
 
 @contextmanager
-def _publishers(bag: Bag, names: list[str], world: World) -> Iterator[dict[str, Any]]:
+def _publishers(bag: Bag, names: list[str], platform: Platform) -> Iterator[dict[str, Any]]:
     os.environ.setdefault("AMENT_PREFIX_PATH", sys.prefix)
     choose_transport()
     types = {name: _type_in(bag, name) for name in names}
-    with Guest("teleop_play", world=world) as guest:
+    with Guest("teleop_play", platform=platform) as guest:
         ros, publishers = guest.ros, {}
         for name, kind in types.items():
             topic = _KNOWN.get(name)

@@ -16,7 +16,7 @@ from teleop_core.graph.topics import BY_NAME, PORTS_BETWEEN_ARMS, Kind, Quality,
 from teleop_core.kernels import held, records
 from teleop_core.kernels.fields import Cells
 from teleop_core.kernels.geometry import Array
-from teleop_core.middleware.world import Publisher, World
+from teleop_core.middleware.platform import Platform, Publisher
 from teleop_core.nodes import wire
 from teleop_core.nodes.feed import NO_BLOCK, Feed
 from teleop_core.nodes.streams import READING, WRITING, Input, Output, Tap, calls_of
@@ -56,7 +56,7 @@ class Ports:
         buttons: tuple[int, ...] = BUTTONS,
     ) -> None:
         self._arm, self._stage, self.row = arm, stage, Cells(signals)
-        self._world: World | None = owner.world if owner is not None else None
+        self._platform: Platform | None = owner.platform if owner is not None else None
         self._must_check = stage.name not in BUILT_IN
         self.refused = 0
         """Number of steps whose outputs were not sent because they contained NaN or infinity."""
@@ -68,7 +68,7 @@ class Ports:
         self._base = np.asarray(signals).ctypes.data, signals.dtype.fields
         self._make_inputs(owner, signals, feeds, joint_names, buttons)
         self._make_outputs(owner, signals, publisher, joint_names)
-        self._calls = calls_of(self._world) if self._world is not None else None
+        self._calls = calls_of(self._platform) if self._platform is not None else None
         self._feed: Feed | None = None
         # First input to read, and the port to leave out; first output to write, and the stamp of samples [ns].
         self._reading, self._writing = np.array((0, -1)), np.zeros(2, np.int64)
@@ -193,10 +193,10 @@ class Ports:
 
     def send_now(self, output: Output, stamp_ns: int) -> None:
         """Send the current values of one output with a stamp [ns]."""
-        assert self._world is not None
+        assert self._platform is not None
         if output.is_pending:
             self.publish()
-        output.write(stamp_ns, self._world.monotonic_ns(), self._world.time_ns())
+        output.write(stamp_ns, self._platform.monotonic_ns(), self._platform.time_ns())
         if not self.waits:
             self.publish()
 
@@ -216,8 +216,8 @@ class Ports:
 
     def _read_clocks(self) -> None:
         """Read the clocks for kernels that cannot read them."""
-        if not self._has_clock and self._world is not None:
-            self._times[:] = self._world.monotonic_ns(), self._world.time_ns()
+        if not self._has_clock and self._platform is not None:
+            self._times[:] = self._platform.monotonic_ns(), self._platform.time_ns()
 
     def connect(self, taps: Mapping[str, Tap], feed: Feed | None) -> None:
         """Give the bytes of all messages to the recorder.

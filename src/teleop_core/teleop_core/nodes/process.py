@@ -9,8 +9,8 @@ from contextlib import ExitStack
 from typing import Protocol
 
 from teleop_core.base.errors import TeleopError
+from teleop_core.middleware.platform import Executor, Platform, PlatformEndedError, TransitionResult
 from teleop_core.middleware.ros import BAD_ARGUMENTS, ROS
-from teleop_core.middleware.world import Executor, TransitionResult, World, WorldEndedError
 from teleop_core.nodes.base import CoreNode
 from teleop_core.nodes.discovery import beyond_this_machine, choose_transport
 from teleop_core.nodes.files import checked_arguments
@@ -66,9 +66,9 @@ class Watching(Protocol):
     word: str
 
 
-def serve(crew: Crew, watch: Watching, world: World) -> int:
+def serve(crew: Crew, watch: Watching, platform: Platform) -> int:
     """Start the nodes, serve them until the end, and end them; returns the exit code."""
-    executor, nodes = world.executor(), crew.nodes
+    executor, nodes = platform.executor(), crew.nodes
     first = nodes[0]
     for node in nodes:
         executor.add_node(node.ros)
@@ -81,7 +81,7 @@ def serve(crew: Crew, watch: Watching, world: World) -> int:
         for node in nodes:  # the node that was started first ends last
             end.callback(node.finish)
         end.callback(_begin_end, crew, watch)
-        code = _autostart(nodes, world)
+        code = _autostart(nodes, platform)
         watch.word = "at work"
         while not code and not first.ended.done():
             _spin_once(executor, first)
@@ -92,7 +92,7 @@ def _spin_once(executor: Executor, node: CoreNode) -> None:
     """Serve one parameter, service or timer of any node."""
     try:
         executor.spin_once()
-    except WorldEndedError:
+    except PlatformEndedError:
         node.end(1)
     except Exception:  # a request cannot be read, such as a forged one
         node.ros.get_logger().error(f"a request failed:\n{traceback.format_exc()}", throttle_duration_sec=10.0)
@@ -105,7 +105,7 @@ def _begin_end(crew: Crew, watch: Watching) -> None:
     crew.halt()
 
 
-def _autostart(nodes: tuple[CoreNode, ...], world: World) -> int:
+def _autostart(nodes: tuple[CoreNode, ...], platform: Platform) -> int:
     """Configure all nodes, which takes long, before activating any; returns the exit code so far."""
     willing = [node for node in nodes if node.options.autostart]
     for node in willing:
@@ -113,7 +113,7 @@ def _autostart(nodes: tuple[CoreNode, ...], world: World) -> int:
             return 0
         if node.ros.trigger("configure") is not TransitionResult.SUCCESS:
             return 2
-    world.tidy()
+    platform.tidy()
     if nodes[0].ended.done():
         return 0
     return 1 if any(node.ros.trigger("activate") is not TransitionResult.SUCCESS for node in willing) else 0

@@ -11,7 +11,7 @@ from typing import Any, Literal
 
 from teleop_core.base.errors import ParameterError
 from teleop_core.graph.topics import Quality, Topic
-from teleop_core.middleware.world import Qos
+from teleop_core.middleware.platform import Qos
 
 PREFIX = "qos_overrides."
 Side = Literal["publisher", "subscription"]

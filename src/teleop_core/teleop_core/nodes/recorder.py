@@ -19,7 +19,7 @@ from teleop_core.base.parameters import fixed, parameter
 from teleop_core.graph.graph import Graph
 from teleop_core.graph.stage import Stage
 from teleop_core.graph.topics import DIAGNOSTICS, Quality, Topic
-from teleop_core.middleware.world import TransitionResult
+from teleop_core.middleware.platform import TransitionResult
 from teleop_core.nodes.feed import FeedReader
 from teleop_core.nodes.files import graph_of
 from teleop_core.nodes.frames import SessionNode
@@ -55,7 +55,7 @@ class _Channel:
     """One recorded topic, with counts of received messages and of messages that the middleware lost."""
 
     def __init__(self, node: SessionNode, topic: Topic) -> None:
-        self.topic, self._node, self._world = topic, node, node.world
+        self.topic, self._node, self._platform = topic, node, node.platform
         self.received = self.lost = 0
         self._numbers: dict[bytes, int] = {}  # last number of each publisher
         self._since_ns = 0  # time since which the topic is read [ns]
@@ -73,7 +73,7 @@ class _Channel:
         """
         if is_inside is not (self._inside_ns is None):
             return
-        since_ns = since_ns or self._world.time_ns()
+        since_ns = since_ns or self._platform.time_ns()
         self._inside_ns = since_ns if is_inside else None
         self._twice = sum(sent_ns >= since_ns for sent_ns in self._recent) if is_inside else 0
 
@@ -115,7 +115,7 @@ class _Channel:
         elif self._subscription is None:
             depth = 10 if self.topic.quality is Quality.LATCHED else DEPTH
             self._numbers.clear()
-            self._since_ns = self._world.monotonic_ns()
+            self._since_ns = self._platform.monotonic_ns()
             self._subscription = Subscription(self._node, self.topic, f"/{self.topic.name}", depth)
 
     def close(self) -> None:
@@ -138,7 +138,7 @@ class _Channel:
 
     def _is_new_there(self) -> bool:
         """Whether an unknown publisher is new, and so cannot have sent before the recorder started."""
-        listens_ns = self._world.monotonic_ns() - self._since_ns
+        listens_ns = self._platform.monotonic_ns() - self._since_ns
         return self.topic.quality is Quality.STREAM and listens_ns > DISCOVERY_NS
 
 
@@ -150,7 +150,7 @@ class RecorderNode(SessionNode):
         self.channels: dict[str, _Channel] = {}
         self.patience = 10.0  # a slow disk is no reason to end a session
         self._feeds: FeedReader | None = None
-        self._writing = self.world.lock()  # locked while something is written, or the file changes
+        self._writing = self.platform.lock()  # locked while something is written, or the file changes
         self._is_recording, self._part, self._marks = False, 0, 0
         self._last: dict[Topic, bytes] = {}  # last messages of latched topics, for the next recording
         serve(self, self, self.fail)
@@ -174,14 +174,14 @@ class RecorderNode(SessionNode):
             parameters=parameters,
             metadata=self._about(configuration),
             hold_ns=HOLD_NS,
-            background=self.world.background,
+            background=self.platform.background,
         )
         self._begin_recording(self._path)
         self._is_broken = False
 
     def _begin_recording(self, path: Path) -> None:
         """Begin a recording with the last messages of latched topics."""
-        now_ns = self.world.time_ns()
+        now_ns = self.platform.time_ns()
         self._writer = self.stage = self._open(path, start_ns=now_ns)
         self._is_recording = True
         self._model.forget()
@@ -196,12 +196,12 @@ class RecorderNode(SessionNode):
     def start(self) -> None:
         """Open the topics; latched topics send their last message."""
         self.channels = {topic.name: _Channel(self, topic) for topic in self._recorded}
-        self._feeds = FeedReader(self.channels, self.world)
+        self._feeds = FeedReader(self.channels, self.platform)
 
     def due(self) -> Sequence[int]:
         """Wait a moment."""
-        self.world.sleep(_PAUSE)
-        return (self.world.monotonic_ns(),)
+        self.platform.sleep(_PAUSE)
+        return (self.platform.monotonic_ns(),)
 
     def step(self, tick_ns: int) -> None:
         """Record the received messages."""
@@ -260,7 +260,7 @@ class RecorderNode(SessionNode):
                 self._writer.write(topic, received_ns, data, sent_ns)
             for topic, data, received_ns in drawn:
                 self._writer.write(topic, received_ns, data)
-            self._writer.flush_older(self.world.time_ns())
+            self._writer.flush_older(self.platform.time_ns())
         except RecordingError:
             self._is_broken = True  # reported once; the written part is closed and safe
             self.exit_code = self.exit_code or 1
@@ -301,7 +301,7 @@ class RecorderNode(SessionNode):
         self._insist(is_recording=True)
         with self._writing:
             self._drain()
-            now_ns, self._marks = self.world.time_ns(), self._marks + 1
+            now_ns, self._marks = self.platform.time_ns(), self._marks + 1
             text = self.parameters.mark or str(self._marks)
             data = report(now_ns, self.member_name, 0, text, {"number": str(self._marks)})
             self._writer.write(self._mark_topic, now_ns, data, now_ns)

@@ -6,7 +6,7 @@ from typing import Protocol
 from std_srvs.srv import Trigger
 
 from teleop_core.base.errors import RecordingError, SessionError
-from teleop_core.middleware.world import Owner
+from teleop_core.middleware.platform import Owner
 
 
 class Recorder(Protocol):

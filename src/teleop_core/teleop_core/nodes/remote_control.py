@@ -10,8 +10,8 @@ from teleop_core.bags.messages import read_reports
 from teleop_core.base.errors import SessionError
 from teleop_core.graph.operation import State
 from teleop_core.graph.topics import OPERATION, SLAVE_OPERATION
+from teleop_core.middleware.platform import Platform
 from teleop_core.middleware.ros import ROS
-from teleop_core.middleware.world import World
 from teleop_core.nodes.guest import Guest
 from teleop_core.nodes.operation import StopButton
 from teleop_core.nodes.streams import Subscription
@@ -44,18 +44,18 @@ class RemoteControl(Guest):
     Args:
         domain: ROS domain.
         patience: Longest time for the discovery of an arm, and for its answer [s].
-        world: World of the session.
+        platform: Platform of the session.
 
     Attributes:
         domain: ROS domain.
         arms: State of every discovered arm, by its namespace.
     """
 
-    def __init__(self, domain: int, patience: float = 3.0, world: World = ROS) -> None:
-        super().__init__("teleop_remote_control", domain, world)
+    def __init__(self, domain: int, patience: float = 3.0, platform: Platform = ROS) -> None:
+        super().__init__("teleop_remote_control", domain, platform)
         self.domain, self._patience = domain, patience
         self.arms: dict[str, ReportedArm] = {}
-        self._executor = self.world.executor()
+        self._executor = self.platform.executor()
         self._executor.add_node(self.ros)
         self._button = StopButton(self)
         self._reports: dict[str, Subscription] = {}
@@ -66,7 +66,7 @@ class RemoteControl(Guest):
         super().close()
 
     def _now(self) -> float:
-        return 1e-9 * self.world.monotonic_ns()
+        return 1e-9 * self.platform.monotonic_ns()
 
     def look(self) -> dict[str, ReportedArm]:
         """Wait until each arm has reported, and return the states by namespace.

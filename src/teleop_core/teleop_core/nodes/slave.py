@@ -72,7 +72,7 @@ class SlaveNode(TickingNode):
         super().step(tick_ns)
         stamp_ns = self.row["slave_setpoint_js_ns"]
         if stamp_ns != self._before_ns:
-            self.delay.put(self.world.time_ns() - stamp_ns)
+            self.delay.put(self.platform.time_ns() - stamp_ns)
 
     def read_ports(self, trigger: Topic | None = None) -> None:
         """Update the signals, and answer every sample of the arm.
@@ -124,7 +124,7 @@ class SlaveNode(TickingNode):
 
     def _look_around(self) -> None:
         """Detect a stepped clock, and a second publisher of commands."""
-        offset_ns = self.world.time_ns() - self.world.monotonic_ns()
+        offset_ns = self.platform.time_ns() - self.platform.monotonic_ns()
         if abs(offset_ns - self._offset_ns) > _CLOCK_STEP_NS:
             step = 1e-9 * (offset_ns - self._offset_ns)
             self._offset_ns = offset_ns

@@ -9,7 +9,7 @@ tick, the newest, and skips the others. It takes its priority again when it uses
 
 from collections.abc import Callable
 
-from teleop_core.middleware.world import World
+from teleop_core.middleware.platform import Platform
 
 WINDOW_NS = 2_000_000_000
 """Time over which a loop is judged [ns]."""
@@ -25,7 +25,7 @@ class Strain:
     """Whether a loop has given way.
 
     Args:
-        world: World of the loop.
+        platform: Platform of the loop.
         take_priority: Gives the loop its priority again; called in the loop.
         say: Called with a text at each change.
 
@@ -34,15 +34,15 @@ class Strain:
         times: How often the loop has given way.
     """
 
-    def __init__(self, world: World, take_priority: Callable[[], object], say: Callable[[str], None]) -> None:
-        self._world, self._take_priority, self._say = world, take_priority, say
+    def __init__(self, platform: Platform, take_priority: Callable[[], object], say: Callable[[str], None]) -> None:
+        self._platform, self._take_priority, self._say = platform, take_priority, say
         self.is_over, self.times = False, 0
         self._used, self._missed = 0.0, 0
         self.start()
 
     def start(self) -> None:
         """Begin a new time of judgement; called in the loop."""
-        self._begin_ns, self._used_ns = self._world.monotonic_ns(), self._world.thread_time_ns()
+        self._begin_ns, self._used_ns = self._platform.monotonic_ns(), self._platform.thread_time_ns()
         self._turns = self._late = 0
 
     def note(self, now_ns: int, missed: int, *, is_late: bool) -> None:
@@ -59,11 +59,11 @@ class Strain:
         self._missed, elapsed_ns = missed, now_ns - self._begin_ns
         if elapsed_ns < WINDOW_NS and not falls_behind:
             return
-        self._used = (self._world.thread_time_ns() - self._used_ns) / max(elapsed_ns, 1)
+        self._used = (self._platform.thread_time_ns() - self._used_ns) / max(elapsed_ns, 1)
         late = self._late / self._turns
         if not self.is_over and (falls_behind or self._used > MOST_USED or late > MOST_LATE):
             self.is_over, self.times = True, self.times + 1
-            self._world.give_way()
+            self._platform.give_way()
             self._say(f"{self.concern()}; {100.0 * late:.0f} % of its ticks were late")
         elif self.is_over and self._used < ROOM and late <= MOST_LATE:
             self.is_over = False

@@ -20,7 +20,7 @@ from teleop_core.kernels import held, record_dtype, records
 from teleop_core.kernels.fields import Cells, Integers, fields_of, record
 from teleop_core.kernels.geometry import Array
 from teleop_core.kernels.memory import integers, octets
-from teleop_core.middleware.world import Owner, Publisher, Taken, Taker, World
+from teleop_core.middleware.platform import Owner, Platform, Publisher, Taken, Taker
 from teleop_core.nodes import wire
 from teleop_core.nodes.feed import Channel
 from teleop_core.nodes.quality import NO_OVERRIDES, QualityOverrides
@@ -113,10 +113,10 @@ def load() -> None:
     wire.write_one(writing, 0, 0, 0)
 
 
-def calls_of(world: World) -> wire.Calls:
-    """C functions of a world for the kernels of its nodes."""
+def calls_of(platform: Platform) -> wire.Calls:
+    """C functions of a platform for the kernels of its nodes."""
     own = record(wire.Calls)
-    for name, address in world.functions().items():
+    for name, address in platform.functions().items():
         own[name] = address
     return own
 
@@ -125,16 +125,16 @@ class RareTakers:
     """Subscriptions that seldom have a message, so that a look at all of them must cost little.
 
     Args:
-        world: World of the subscriptions.
+        platform: Platform of the subscriptions.
         own: The subscriptions.
     """
 
-    def __init__(self, world: World, own: Sequence[Taker]) -> None:
+    def __init__(self, platform: Platform, own: Sequence[Taker]) -> None:
         self._own, self._count = own, np.zeros(1, np.int64)
         found = [getattr(taker, "places", None) for taker in own]
         self._look: Callable[[], None] | None = None
         if all(places is not None for places in found):
-            self._look = held(wire.take_raw, np.array(found, np.int64), calls_of(world), self._count)
+            self._look = held(wire.take_raw, np.array(found, np.int64), calls_of(platform), self._count)
 
     def next(self, count: int) -> tuple[int, Taken] | None:
         """Index of one of the first ``count`` subscriptions, and its oldest message; None if none has a message."""
@@ -182,7 +182,7 @@ class Input:
         into: Any = None,
     ) -> None:
         self.topic, self._owner, self._name = topic, owner, name
-        self._world, options = owner.world, getattr(owner, "options", None)
+        self._platform, options = owner.platform, getattr(owner, "options", None)
         burst = options.max_catch_up if options is not None else 0
         self._waiting = max(_PRESSES if topic.kind is Kind.BUTTONS else _WAITING, burst)
         self._joint_names, self._target, self._row = topic.names(joint_names), target, np.zeros(len(target))
@@ -200,7 +200,7 @@ class Input:
         self._describe()
         self._bytes = bytearray(self._cells["size"] + _SPARE)
         self._bytes_at = np.frombuffer(self._bytes, np.uint8).ctypes.data
-        calls = calls_of(self._world)
+        calls = calls_of(self._platform)
         kernels = wire.answer_take, wire.answer_newest
         self._take, self._newest = (held(kernel, own, calls) for kernel in kernels)
         given = np.zeros(6, np.int64)
@@ -311,7 +311,7 @@ class Input:
         """State of the buttons; empty for an input without buttons."""
         return self._target.tobytes() if self._is_buttons else b""
 
-    # -- in Python: what is rare, and everything in a world whose middleware kernels cannot reach -----
+    # -- in Python: what is rare, and everything on a platform whose middleware kernels cannot reach -----
 
     def _take_in_python(self) -> bool:
         assert self.subscription is not None
@@ -337,7 +337,7 @@ class Input:
             size = 0  # another form
         self._bytes[:size] = data[:size]
         given[0], given[1] = halves(sender)
-        given[2], given[3], given[4], given[5] = number, self._world.monotonic_ns(), self._bytes_at, size
+        given[2], given[3], given[4], given[5] = number, self._platform.monotonic_ns(), self._bytes_at, size
         self._look()
         answer = self._answer[0]
         if answer != wire.FOREIGN:
@@ -352,8 +352,8 @@ class Input:
         """Write the next valid delayed message that is due into the signals; return whether there was one."""
         while self.subscription is not None and (taken := self.subscription.take()) is not None:
             if (found := self._admitted(taken)) is not None:
-                self._held.append((self._world.monotonic_ns() + self._delay_ns, found[0], found[1].copy()))
-        now_ns = self._world.monotonic_ns()
+                self._held.append((self._platform.monotonic_ns() + self._delay_ns, found[0], found[1].copy()))
+        now_ns = self._platform.monotonic_ns()
         while self._held and self._held[0][0] <= now_ns:
             _, stamp_ns, values = self._held.popleft()
             if self._accept(stamp_ns, values):
@@ -363,8 +363,8 @@ class Input:
     def _accept(self, stamp_ns: int, values: messages.Values) -> bool:
         if values is not self._row:
             self._row[:] = values
-        given, world = self._given, self._world
-        given[0], given[1], given[2] = stamp_ns, world.monotonic_ns(), world.time_ns()
+        given, platform = self._given, self._platform
+        given[0], given[1], given[2] = stamp_ns, platform.monotonic_ns(), platform.time_ns()
         self._judge()
         return bool(self._answer[0])
 
@@ -381,7 +381,7 @@ class Input:
         """Time since the last valid message was read [s]; infinite before the first."""
         if not self._has_stamp[0]:
             return float("inf")
-        return float((self._world.monotonic_ns() - self._cells["arrival_ns"]) * 1e-9)
+        return float((self._platform.monotonic_ns() - self._cells["arrival_ns"]) * 1e-9)
 
     def forget(self) -> None:
         """Discard the queue and restart: the next message may have any stamp."""
@@ -424,7 +424,7 @@ class Input:
     def hold(self, stamp_ns: int, values: messages.Values) -> None:
         """Receive a sample of a sender in this process, on a link with a delay."""
         self._cells["received"] += 1
-        self._held.append((self._world.monotonic_ns() + self._delay_ns, stamp_ns, values.copy()))
+        self._held.append((self._platform.monotonic_ns() + self._delay_ns, stamp_ns, values.copy()))
 
     def close(self) -> None:
         """Stop listening to the topic."""

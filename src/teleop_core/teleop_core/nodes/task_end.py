@@ -4,7 +4,7 @@ import numpy as np
 
 from teleop_core.graph.graph import Graph
 from teleop_core.graph.topics import TASK_STATE
-from teleop_core.middleware.world import Owner
+from teleop_core.middleware.platform import Owner
 from teleop_core.nodes.streams import Input
 
 _OVER = TASK_STATE.columns.index("is_over")

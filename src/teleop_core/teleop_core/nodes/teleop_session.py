@@ -9,8 +9,8 @@ from typing import Any
 
 from teleop_core.base.errors import UnknownNameError
 from teleop_core.graph.graph import FRAMES_NAME, RECORDER_NAME, Graph, Member
+from teleop_core.middleware.platform import Platform
 from teleop_core.middleware.ros import ROS
-from teleop_core.middleware.world import World
 from teleop_core.nodes.base import CoreNode
 from teleop_core.nodes.files import graph_of
 from teleop_core.nodes.frames import FramesNode
@@ -35,7 +35,7 @@ class TeleopSession:
         namespace: Namespace of the whole session, without leading slash; the arms are below it.
         names: Nodes of this process, with the namespaces of their arms; empty: all nodes. Nodes in other processes are
             connected by topics.
-        world: World of the session.
+        platform: Platform of the session.
         graph: Graph of the session; None: the graph of the parameter files on the command line.
 
     Raises:
@@ -43,7 +43,7 @@ class TeleopSession:
     """
 
     def __init__(
-        self, namespace: str = "", names: Sequence[str] = (), world: World = ROS, graph: Graph | None = None
+        self, namespace: str = "", names: Sequence[str] = (), platform: Platform = ROS, graph: Graph | None = None
     ) -> None:
         graph = graph or graph_of(sys.argv)
         known = [*(member.name for member in graph.members), FRAMES_NAME]
@@ -51,10 +51,10 @@ class TeleopSession:
             if name not in known:
                 raise UnknownNameError("node of the session", name, known)
         members = [member for member in graph.members if member.name in names or not names]
-        given: dict[str, Any] = {"graph": graph, "namespace": namespace, "world": world}
+        given: dict[str, Any] = {"graph": graph, "namespace": namespace, "platform": platform}
         self._recorder: tuple[RecorderNode, ...] = () if names else (RecorderNode(**given),)
         self._frames = (FramesNode(**given),) if FRAMES_NAME in names or not names else ()
-        self._stages = tuple(_node(graph, member, namespace, world) for member in members)
+        self._stages = tuple(_node(graph, member, namespace, platform) for member in members)
         pairs = [*zip(members, self._stages, strict=True)]
         for beside in (*self._recorder, *self._frames):
             beside.stages = {member.name: node.parameters for member, node in pairs}
@@ -65,8 +65,8 @@ class TeleopSession:
             self._stages,
             self._stages[-1].fail,
             Schedule(
-                world.monotonic_ns,
-                world.sleep,
+                platform.monotonic_ns,
+                platform.sleep,
                 self._stages[-1].options.max_catch_up,
                 phase_ns=0 if members[0] is graph.members[0] else _AFTER_NS,
             ),
@@ -92,8 +92,8 @@ class TeleopSession:
         self._loop.stop()
 
 
-def _node(graph: Graph, member: Member, namespace: str, world: World) -> CoreNode:
+def _node(graph: Graph, member: Member, namespace: str, platform: Platform) -> CoreNode:
     texts = link_texts(graph, member)
     given = {"links": tuple(texts)} if texts else {}
     where = "/".join(filter(None, (namespace, member.arm)))
-    return make_node(member.stage, values=given, namespace=where, world=world)
+    return make_node(member.stage, values=given, namespace=where, platform=platform)

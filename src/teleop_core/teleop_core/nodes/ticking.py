@@ -8,7 +8,7 @@ class TickingNode(CoreNode):
 
     def start(self) -> None:
         """Store the offset between the monotonic time of the loop and the time of stamps."""
-        self.epoch_ns = self.world.time_ns() - self.world.monotonic_ns()
+        self.epoch_ns = self.platform.time_ns() - self.platform.monotonic_ns()
 
     def take(self) -> None:
         """Read the received messages."""

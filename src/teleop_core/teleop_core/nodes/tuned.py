@@ -9,9 +9,9 @@ from teleop_core.base.errors import ParameterError, SessionError, TeleopError
 from teleop_core.base.parameters import Value, Within, build, fixed, specs, values_of
 from teleop_core.graph.layers import RealTimeParameters
 from teleop_core.graph.stage import Runner, Stage
+from teleop_core.middleware.platform import Hooks, LifecycleNode, Platform
 from teleop_core.middleware.ros import ROS
 from teleop_core.middleware.ros_type_support import spare_generator
-from teleop_core.middleware.world import Hooks, LifecycleNode, World
 from teleop_core.nodes.quality import PREFIX, QualityOverrides
 from teleop_core.nodes.sender import Sender
 
@@ -91,8 +91,8 @@ class TunedNode(Hooks):
     Args:
         stage: Stage of the node in the graph.
         group: Parameter group that replaces the group of the stage; None for the group of the stage.
-        world: World of the node.
-        options: Options of :meth:`~teleop_core.middleware.world.World.lifecycle_node`.
+        platform: Platform of the node.
+        options: Options of :meth:`~teleop_core.middleware.platform.Platform.lifecycle_node`.
 
     Attributes:
         ros: Node of the middleware.
@@ -101,12 +101,12 @@ class TunedNode(Hooks):
         TeleopError: A given parameter is unknown or not allowed.
     """
 
-    def __init__(self, stage: Stage, group: type | None = None, world: World = ROS, **options: Any) -> None:
-        self.world = world
-        self.ros: LifecycleNode = world.lifecycle_node(stage.name, self, **options)
+    def __init__(self, stage: Stage, group: type | None = None, platform: Platform = ROS, **options: Any) -> None:
+        self.platform = platform
+        self.ros: LifecycleNode = platform.lifecycle_node(stage.name, self, **options)
         self.runner: Runner | None = None
         """The running stage; None before it is made, and for a node without a stage."""
-        self.lock = world.lock()  # locked while the stage works or accepts parameters
+        self.lock = platform.lock()  # locked while the stage works or accepts parameters
         self._groups = (NodeParameters, group or stage.parameters)
         self._specs = {spec.name: spec for entry in self._groups for spec in specs(entry)}
         self.overrides = QualityOverrides(self.ros.given)

@@ -6,8 +6,8 @@ stage, or writes or sends all of them, without the interpreter. Python decides o
 form, a link with a delay, a report.
 
 The middleware is reached in two ways. ROS and the simulated machine give the addresses of C functions, so that kernels
-take and send by themselves. A world without them takes and sends in Python; admission, reading, acceptance and writing
-are the same kernels.
+take and send by themselves. A platform without them takes and sends in Python; admission, reading, acceptance and
+writing are the same kernels.
 """
 
 from typing import Annotated
@@ -41,7 +41,7 @@ _FRAME = 20  # bytes of a feed's frame before its message
 
 
 class Calls(Fields):
-    """Addresses of the C functions of the middleware and of the clock; all 0 in a world that has none.
+    """Addresses of the C functions of the middleware and of the clock; all 0 on a platform that has none.
 
     The function of the clock also gets ``context``, which the system's function does not read.
 
@@ -515,7 +515,7 @@ def write_all(outputs: Array, calls: Calls, place: Integers, times: Integers) ->
         calls: C functions.
         place: The first output to write; then the stamp of outputs that pass on no stamp [ns]. The first is set to
             the index of an output whose last message must be sent first, or to n if all are written.
-        times: Monotonic time and time of the system's clock [ns], in a world without C functions.
+        times: Monotonic time and time of the system's clock [ns], on a platform without C functions.
     """
     if calls.clock:
         times[0], times[1] = read_clock(calls, 1), read_clock(calls, 0)

@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 
 from teleop_core.bags.messages import SECOND_NS
+from teleop_core.middleware.platform import Endpoint, Node, Platform, Publisher, Qos
 from teleop_core.middleware.ros import ROS
 from teleop_core.middleware.ros_messages import read_message
-from teleop_core.middleware.world import Endpoint, Node, Publisher, Qos, World
 from teleop_core.nodes.guest import Guest
 from teleop_core.nodes.interrupt import Interrupt
 from teleop_core.nodes.streams import message_type
@@ -71,7 +71,7 @@ class ArmClient(Guest):
     Args:
         namespace: Namespace of the arm's topics, such as ``/PSM1`` or ``slave``.
         domain: ROS domain; None for that of the environment.
-    world: Middleware and time of the client.
+    platform: Middleware and time of the client.
 
     Attributes:
         interrupt: Ends a wait with KeyboardInterrupt.
@@ -80,10 +80,10 @@ class ArmClient(Guest):
         MessageTypeError: A package of messages is not installed, such as crtk_msgs.
     """
 
-    def __init__(self, namespace: str, domain: int | None = None, world: World = ROS) -> None:
+    def __init__(self, namespace: str, domain: int | None = None, platform: Platform = ROS) -> None:
         for row in CRTK_TOPICS:  # subscribe before the arm moves
             message_type(row.ros_type)
-        super().__init__("teleop_conformance", domain, world)
+        super().__init__("teleop_conformance", domain, platform)
         self._own = f"/{self.ros.get_name()}"
         self.namespace = "/" + namespace.strip("/")
         self.interrupt = Interrupt()
@@ -168,7 +168,7 @@ class ArmClient(Guest):
         """Send a command with the present time as its stamp."""
         if hasattr(message, "header"):
             stamp = message.header.stamp
-            stamp.sec, stamp.nanosec = divmod(self.world.time_ns(), SECOND_NS)
+            stamp.sec, stamp.nanosec = divmod(self.platform.time_ns(), SECOND_NS)
         self.publisher_of(name).publish(message)
 
     def publisher_of(self, name: str) -> Publisher:
@@ -187,14 +187,14 @@ class ArmClient(Guest):
 
     def wait(self, condition: Callable[[], bool], timeout: float) -> bool:
         """Whether a condition becomes true within a time [s]."""
-        end_ns = self.world.monotonic_ns() + round(timeout * SECOND_NS)
+        end_ns = self.platform.monotonic_ns() + round(timeout * SECOND_NS)
         while not condition():
             self.interrupt.check()
             for tap in self._keeping.values():
                 tap.drain()
-            if self.world.monotonic_ns() > end_ns:
+            if self.platform.monotonic_ns() > end_ns:
                 return False
-            self.world.sleep(_TURN)
+            self.platform.sleep(_TURN)
         return True
 
     def pause(self, seconds: float) -> None:

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from teleop_core.bags.messages import SECOND_NS
-from teleop_core.middleware.world import Endpoint
+from teleop_core.middleware.platform import Endpoint
 from teleop_drill.conformance.crtk_topics import STATES, CrtkTopic, Finding, Group, RowResult
 from teleop_drill.nodes.conformance_arm import ArmClient, numbers_of, stamp_of
 
@@ -38,8 +38,8 @@ def _listen(arm: ArmClient, row: CrtkTopic, ends: list[Endpoint]) -> Finding:
     messages: list[Any] = []
     tap = arm.tap(row.name)
     arm.wait(lambda: tap.read(messages.append) > 0, _FIRST)
-    begin_ns, before = arm.world.monotonic_ns(), tap.count
-    while (looked := (arm.world.monotonic_ns() - begin_ns) / SECOND_NS) < _LOOK:
+    begin_ns, before = arm.platform.monotonic_ns(), tap.count
+    while (looked := (arm.platform.monotonic_ns() - begin_ns) / SECOND_NS) < _LOOK:
         tap.read(messages.append)
         arm.pause(0.01)
     rate = (tap.count - before) / looked
@@ -47,7 +47,7 @@ def _listen(arm: ArmClient, row: CrtkTopic, ends: list[Endpoint]) -> Finding:
     if not messages:
         return Finding(row, RowResult.FAILED, "no message", f"no message came within {_FIRST:g} s")
     found = f"{rate:.0f} Hz" if rate > 0 else "1 message"
-    faults = [*_stamps(row, messages, arm.world.time_ns()), *_content(row, messages)]
+    faults = [*_stamps(row, messages, arm.platform.time_ns()), *_content(row, messages)]
     if faults:
         return Finding(row, RowResult.FAILED, found, faults[0])
     if len(ends) > 1:

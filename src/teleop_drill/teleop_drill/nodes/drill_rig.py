@@ -15,8 +15,8 @@ from teleop_core.bags.messages import layout
 from teleop_core.graph.operation import State
 from teleop_core.graph.topics import SLAVE_MEASURED_JS, SLAVE_OPERATION, SLAVE_SETPOINT_JS, TELEOP_STATE, Topic
 from teleop_core.kernels.geometry import Array
+from teleop_core.middleware.platform import Qos
 from teleop_core.middleware.ros_parameters import to_message
-from teleop_core.middleware.world import Qos
 from teleop_core.nodes.guest import Guest
 from teleop_core.nodes.observer import WARNING, ReportReader
 from teleop_core.nodes.operation import RELEASE, STOP_TOPIC
@@ -52,14 +52,14 @@ class LiveRig:
     def __init__(self, site: Site, configuration: Configuration, robot: Robot) -> None:
         assert robot.drives is not None
         self.site = site
-        self.is_composed, self._robot, world = site.is_composed, robot, site.world
-        self._world, domain = world, site.domain
+        self.is_composed, self._robot, platform = site.is_composed, robot, site.platform
+        self._platform, domain = platform, site.domain
         self._speed_limit = np.array(robot.drives.speed_limit)
         self._control = site.control
-        self.observer = ReportReader(domain, world=world)
+        self.observer = ReportReader(domain, platform=platform)
         self.session: SessionProcesses = site.session(self.observer)
-        self._node, self._own = Guest("drill", domain, world), Guest("drill_hand", domain, world)
-        self._executor = self._node.world.executor()
+        self._node, self._own = Guest("drill", domain, platform), Guest("drill_hand", domain, platform)
+        self._executor = self._node.platform.executor()
         self._executor.add_node(self._node.ros)
         # The buttons are latched, because the slave treats a button without latched state as pressed until its first
         # message. They are created long before a press, because a message during the discovery between button and
@@ -96,7 +96,7 @@ class LiveRig:
 
     def mark(self) -> None:
         """Declare that the fault begins now."""
-        self.begin_ns, self.warned, self.said = self._world.time_ns(), {}, ""
+        self.begin_ns, self.warned, self.said = self._platform.time_ns(), {}, ""
         self._warned_before = self._warnings()
 
     def _warnings(self) -> dict[str, str]:
@@ -116,11 +116,11 @@ class LiveRig:
 
     def now_ns(self) -> int:
         """Time [ns]."""
-        return self._world.time_ns()
+        return self._platform.time_ns()
 
     def now(self) -> float:
         """Time of a monotonic clock [s]."""
-        return 1e-9 * self._world.monotonic_ns()
+        return 1e-9 * self._platform.monotonic_ns()
 
     def wait(self, seconds: float) -> None:
         """Wait for a time [s]; new warnings of nodes are stored with their time."""
@@ -130,7 +130,7 @@ class LiveRig:
             self.observer.listen(min(left, 0.02))
             for name, text in self._warnings().items():
                 arrival = self.observer.statuses[name].arrival
-                arrival_ns = self._world.time_ns() - round(1e9 * (self.now() - arrival))
+                arrival_ns = self._platform.time_ns() - round(1e9 * (self.now() - arrival))
                 is_new = self._warned_before.get(name) != text
                 if name not in self.warned and (is_new or arrival_ns > self.begin_ns + _PERIOD_NS):
                     self.warned[name] = arrival_ns
@@ -226,7 +226,7 @@ class LiveRig:
             self.wait(seconds - (self.now() - begin))
         finally:
             if self.is_composed or node in _SLAVE:
-                self.woken_ns = self._world.time_ns()
+                self.woken_ns = self._platform.time_ns()
             self.session.send(node, signal.SIGCONT)
 
     def limit_files(self, node: str, room: int | None) -> None:
@@ -287,7 +287,7 @@ class LiveRig:
             is_first = len(self._intruders) == 1
             deadline = self.now() + _FOUND
             while made.get_subscription_count() == 0 and self.now() < deadline:
-                self._world.sleep(2e-3)
+                self._platform.sleep(2e-3)
             if is_first:
                 self.mark()
         return self._intruders[topic.name]
@@ -296,7 +296,7 @@ class LiveRig:
         """Send a message of a stop button with the given number."""
         own, deadline = self._buttons[button], self.now() + _FOUND
         while own.get_subscription_count() == 0 and self.now() < deadline:
-            self._world.sleep(2e-3)
+            self._platform.sleep(2e-3)
         if is_pressed:
             self.mark()
         own.publish(Bool(data=is_pressed))

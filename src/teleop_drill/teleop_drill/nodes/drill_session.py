@@ -16,8 +16,8 @@ from teleop_core.base.errors import SessionError
 from teleop_core.base.own_parts import VARIABLE
 from teleop_core.base.plain_yaml import written
 from teleop_core.graph.graph import RECORDER_NAME
+from teleop_core.middleware.platform import Platform
 from teleop_core.middleware.ros import ROS
-from teleop_core.middleware.world import World
 from teleop_core.nodes.children import Child, end_all, environment, free_domain
 from teleop_core.nodes.interrupt import Interrupt
 from teleop_core.nodes.live import session_parameters
@@ -240,7 +240,7 @@ class LiveSite:
         foreign: Command lines of processes of other software, by name.
     """
 
-    world: World = ROS
+    platform: Platform = ROS
 
     def __init__(
         self,

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Protocol
 
-from teleop_core.middleware.world import World
+from teleop_core.middleware.platform import Platform
 from teleop_core.nodes.interrupt import Interrupt
 from teleop_core.nodes.observer import ReportReader
 from teleop_drill.drill import inside
@@ -70,7 +70,7 @@ class Site(Protocol):
     """Machine on which sessions are drilled: this machine, or a simulated one.
 
     Attributes:
-        world: Middleware and time of the drill itself.
+        platform: Middleware and time of the drill itself.
         domain: ROS domain of the sessions.
         is_composed: Whether all nodes share one process.
         master: Kind of operator that moves the hand.
@@ -78,7 +78,7 @@ class Site(Protocol):
         interrupt: Object that ends a wait of the drill with KeyboardInterrupt.
     """
 
-    world: World
+    platform: Platform
     domain: int
     is_composed: bool
     master: Master

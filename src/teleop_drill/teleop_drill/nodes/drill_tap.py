@@ -21,7 +21,7 @@ from teleop_core.graph.topics import (
     Topic,
 )
 from teleop_core.kernels.geometry import Array
-from teleop_core.middleware.world import Owner
+from teleop_core.middleware.platform import Owner
 from teleop_core.nodes.streams import Subscription, message_type, profile
 from teleop_drill.drill import hand
 from teleop_drill.drill.hand import Distortion, Sample
@@ -58,7 +58,7 @@ class Tap:
     def __init__(
         self, owner: Owner, joint_names: tuple[str, ...], real_time: RealTimeParameters, *, has_hand: bool
     ) -> None:
-        self._real_time, self._world = real_time, owner.world
+        self._real_time, self._platform = real_time, owner.platform
         self.distortion: Distortion = hand.faithful
         self.is_mute, self._joint_names = False, joint_names
         self._heard: dict[str, Heard] = {topic.name: [] for topic in _HEARD}
@@ -67,8 +67,8 @@ class Tap:
         self._listened_ns = 0  # time at which the tap last began to take waiting messages
         self._subscriptions = [Subscription(owner, t, f"/{t.name}", _QUEUE) for t in _HEARD]
         self._hand = _Hand(owner, self) if has_hand else None
-        self._is_running, self._lock = True, self._world.lock()
-        self._thread = self._world.thread("tap", self._run)
+        self._is_running, self._lock = True, self._platform.lock()
+        self._thread = self._platform.thread("tap", self._run)
         self._thread.start()
 
     def close(self) -> None:
@@ -139,7 +139,7 @@ class Tap:
         """Time since the newest message of a topic was sent [s]; infinite before the first message."""
         with self._lock:
             heard = self._heard[topic.name]
-            return 1e-9 * (self._world.time_ns() - heard[-1][0]) if heard else float("inf")
+            return 1e-9 * (self._platform.time_ns() - heard[-1][0]) if heard else float("inf")
 
     def is_commanded(self) -> bool:
         """Whether the newest setpoint was computed from a command; if not, the arm moves without a command."""
@@ -159,10 +159,10 @@ class Tap:
         ]
 
     def _now(self) -> float:
-        return 1e-9 * self._world.monotonic_ns()
+        return 1e-9 * self._platform.monotonic_ns()
 
     def _run(self) -> None:
-        self._world.take_real_time(self._real_time)
+        self._platform.take_real_time(self._real_time)
         due = self._now()
         while self._is_running:
             if self._hand is not None:
@@ -174,12 +174,12 @@ class Tap:
                 # machine
                 due = now if due < now - _FAR_BEHIND else due
                 continue
-            self._world.sleep(due - now)
-            self._late.append((self._world.time_ns(), max(0.0, self._now() - due)))
+            self._platform.sleep(due - now)
+            self._late.append((self._platform.time_ns(), max(0.0, self._now() - due)))
 
     def _listen(self) -> None:
         with self._lock:
-            self._listened_ns = self._world.time_ns()
+            self._listened_ns = self._platform.time_ns()
             for subscription in self._subscriptions:
                 heard = self._heard[subscription.topic.name]
                 while (taken := subscription.take()) is not None:
@@ -206,15 +206,15 @@ class _Hand:
     """Publishers of the hand."""
 
     def __init__(self, owner: Owner, tap: Tap) -> None:
-        self._tap, self._world, self._count = tap, owner.world, 0
-        self._begin_ns = self._world.monotonic_ns()
+        self._tap, self._platform, self._count = tap, owner.platform, 0
+        self._begin_ns = self._platform.monotonic_ns()
         self._pose = sender(owner, MASTER_MEASURED_CP, ())
         self._buttons = sender(owner, MASTER_BUTTONS, ())
 
     def move(self) -> None:
         """Send all samples that are due."""
-        stamp_ns = self._world.time_ns()
-        pose = hand.circle(1e-9 * (self._world.monotonic_ns() - self._begin_ns))
+        stamp_ns = self._platform.time_ns()
+        pose = hand.circle(1e-9 * (self._platform.monotonic_ns() - self._begin_ns))
         if self._count % _BUTTONS_EVERY == 0 and not self._tap.is_mute:
             self._buttons(stamp_ns, np.zeros(3))
         for sample in self._tap.distortion(Sample(stamp_ns, pose)):

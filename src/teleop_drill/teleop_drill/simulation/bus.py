@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from random import Random
 
-from teleop_core.middleware.world import Endpoint, Taken
+from teleop_core.middleware.platform import Endpoint, Taken
 from teleop_drill.simulation.ends import Match, Reader, Service, Writer
 from teleop_drill.simulation.machine import Process
 from teleop_drill.simulation.reach import functions

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from teleop_core.base.errors import ParameterError
 from teleop_core.graph.graph import RECORDER_NAME
-from teleop_core.middleware.world import World
+from teleop_core.middleware.platform import Platform
 from teleop_core.nodes.crews import Processes, crews
 from teleop_core.nodes.interrupt import Interrupt
 from teleop_core.nodes.observer import ReportReader
@@ -18,10 +18,10 @@ from teleop_drill.nodes.drill_site import Site, Steering
 from teleop_drill.simulation.bus import Bus
 from teleop_drill.simulation.inside import SimulatedSteering
 from teleop_drill.simulation.machine import Machine, Process
+from teleop_drill.simulation.platform import SimulatedPlatform
 from teleop_drill.simulation.scheduler import Scheduler
 from teleop_drill.simulation.session import ARM, SimulatedSession
 from teleop_drill.simulation.stand_ins import Work
-from teleop_drill.simulation.world import SimulatedWorld
 
 
 class SimulatedSite:
@@ -49,7 +49,7 @@ class SimulatedSite:
         self._configuration, self._folder = configuration, folder
         self._bus, self._owner, self._processes = bus, owner, processes
         self._foreign = foreign
-        self.world: World = SimulatedWorld(bus, owner)
+        self.platform: Platform = SimulatedPlatform(bus, owner)
         self._steering = SimulatedSteering(owner.machine)
         self.control: Steering = self._steering
 

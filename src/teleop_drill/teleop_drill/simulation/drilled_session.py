@@ -17,7 +17,7 @@ from teleop_core.graph.graph import RECORDER_NAME
 from teleop_core.graph.operation import State
 from teleop_core.graph.topics import OPERATION, SLAVE_OPERATION, TELEOP_STATE, Topic
 from teleop_core.kernels.geometry import Array
-from teleop_core.middleware.world import Qos, Taken
+from teleop_core.middleware.platform import Qos, Taken
 from teleop_core.nodes.crews import Processes, crews
 from teleop_core.nodes.observer import ReportReader
 from teleop_core.nodes.operation import STOP_TOPIC
@@ -30,8 +30,8 @@ from teleop_drill.drill.exercise import Master
 from teleop_drill.simulation import sometimes
 from teleop_drill.simulation.bus import Bus
 from teleop_drill.simulation.machine import Process
+from teleop_drill.simulation.platform import SimulatedPlatform
 from teleop_drill.simulation.session import SimulatedSession
-from teleop_drill.simulation.world import SimulatedWorld
 
 _FRESH_NS = 200_000_000
 
@@ -58,12 +58,12 @@ class DrilledSession:
         processes: Processes = Processes.SIDES,
     ) -> None:
         self.bus, self.machine, self.robot = bus, owner.machine, robot
-        self.world = SimulatedWorld(bus, owner)
-        self._executor = self.world.executor()
-        self._node = self.world.node("drill")
+        self.platform = SimulatedPlatform(bus, owner)
+        self._executor = self.platform.executor()
+        self._node = self.platform.node("drill")
         self._executor.add_node(self._node)
-        self.world.thread("executor", self._spin).start()
-        observer = ReportReader(0, world=self.world)
+        self.platform.thread("executor", self._spin).start()
+        observer = ReportReader(0, platform=self.platform)
         shared = {name: nodes for crew in crews(configuration.graph, processes) for name, nodes in crew.items()}
         self.names = tuple(shared)
         self.session = SimulatedSession(bus, owner, configuration, shared, folder, observer, Master.DEVICE)

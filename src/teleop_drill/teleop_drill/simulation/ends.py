@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any, Protocol
 
+from teleop_core.middleware.platform import Qos, Taken
 from teleop_core.middleware.ros_messages import write_message
-from teleop_core.middleware.world import Qos, Taken
 from teleop_core.nodes.sender import halves
 from teleop_drill.simulation.machine import Process
 from teleop_drill.simulation.reach import NEVER_NS, TAKE_NS, Reached
@@ -55,7 +55,7 @@ class _Carrier(Protocol):
 
 
 class Writer:
-    """Writer of a topic, with the interface of :class:`~teleop_core.middleware.world.Publisher`.
+    """Writer of a topic, with the interface of :class:`~teleop_core.middleware.platform.Publisher`.
 
     Args:
         bus: The simulated middleware.
@@ -129,7 +129,7 @@ class Writer:
 
 
 class Reader:
-    """Reader of a topic, with the interface of :class:`~teleop_core.middleware.world.Taker`.
+    """Reader of a topic, with the interface of :class:`~teleop_core.middleware.platform.Taker`.
 
     Args:
         bus: The simulated middleware.

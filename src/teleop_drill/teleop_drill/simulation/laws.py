@@ -17,7 +17,7 @@ from teleop_core.graph.signals import DT
 from teleop_core.graph.topics import NO_COMMAND_NS, SLAVE_SETPOINT_JS
 from teleop_core.kernels.fields import Cells
 from teleop_core.kernels.geometry import Array
-from teleop_core.middleware.world import Taken
+from teleop_core.middleware.platform import Taken
 from teleop_core.slave.commands import CommandStatus
 from teleop_core.slave.velocity import MotionSource
 from teleop_drill.drill.numbers import Numbers
@@ -148,7 +148,7 @@ class Laws:
     # -- at every setpoint -----------------------------------------------------------------------
 
     def _judge_setpoint(self, taken: Taken) -> None:
-        self._sent_ns.setdefault(taken.sender, []).append(self._stage.world.time_ns())
+        self._sent_ns.setdefault(taken.sender, []).append(self._stage.platform.time_ns())
         found = self._form.decode_one(taken.data)
         slave, process = self._stage.session.node("slave"), self._stage.session.process_of("slave")
         if found is None or slave is None:

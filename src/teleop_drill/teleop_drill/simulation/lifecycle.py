@@ -10,8 +10,8 @@ from rcl_interfaces.msg import SetParametersResult
 from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters, SetParameters, SetParametersAtomically
 
 from teleop_core.base.parameters import Spec, Value
+from teleop_core.middleware.platform import Hooks, Qos, TransitionResult
 from teleop_core.middleware.ros_parameters import descriptor, from_message, to_message
-from teleop_core.middleware.world import Hooks, Qos, TransitionResult
 from teleop_drill.simulation.bus import Bus
 from teleop_drill.simulation.ends import Writer
 from teleop_drill.simulation.machine import Process
@@ -39,7 +39,7 @@ _WORDS = {
 
 
 class SimulatedLifecycleNode(SimulatedNode):
-    """Simulated form of :class:`~teleop_core.middleware.world.LifecycleNode`.
+    """Simulated form of :class:`~teleop_core.middleware.platform.LifecycleNode`.
 
     Args:
         bus: The simulated middleware.

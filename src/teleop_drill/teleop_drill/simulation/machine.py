@@ -153,7 +153,7 @@ class Process(Turns):
 
 
 class Listener:
-    """Simulated form of :class:`~teleop_core.middleware.world.Listener`."""
+    """Simulated form of :class:`~teleop_core.middleware.platform.Listener`."""
 
     def __init__(self, machine: "Machine", place: str) -> None:
         self._machine, self._place = machine, place
@@ -169,7 +169,7 @@ class Listener:
 
 
 class SocketEnd:
-    """Simulated form of :class:`~teleop_core.middleware.world.Line`."""
+    """Simulated form of :class:`~teleop_core.middleware.platform.Line`."""
 
     def __init__(self) -> None:
         self.came = bytearray()

@@ -5,8 +5,8 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
+from teleop_core.middleware.platform import Endpoint, Qos
 from teleop_core.middleware.ros_messages import read_message
-from teleop_core.middleware.world import Endpoint, Qos
 from teleop_drill.simulation.bus import Bus
 from teleop_drill.simulation.ends import Reader, Service, Writer
 from teleop_drill.simulation.machine import Process, Said
@@ -14,7 +14,7 @@ from teleop_drill.simulation.scheduler import Strand
 
 
 class SimulatedExecutor:
-    """Simulated form of :class:`~teleop_core.middleware.world.Executor`."""
+    """Simulated form of :class:`~teleop_core.middleware.platform.Executor`."""
 
     def __init__(self, process: Process) -> None:
         self._scheduler = process.machine.scheduler
@@ -51,7 +51,7 @@ class SimulatedExecutor:
 
 
 class Timer:
-    """Simulated form of :class:`~teleop_core.middleware.world.Timer`."""
+    """Simulated form of :class:`~teleop_core.middleware.platform.Timer`."""
 
     def __init__(self, node: "SimulatedNode", period: float, callback: Callable[[], None]) -> None:
         self._node, self._callback = node, callback
@@ -83,7 +83,7 @@ class Timer:
 
 
 class GuardCondition:
-    """Simulated form of :class:`~teleop_core.middleware.world.GuardCondition`."""
+    """Simulated form of :class:`~teleop_core.middleware.platform.GuardCondition`."""
 
     def __init__(self, node: "SimulatedNode", callback: Callable[[], None]) -> None:
         self._node, self._callback, self._is_due = node, callback, False
@@ -129,7 +129,7 @@ class FutureAnswer:
 
 
 class Client:
-    """Simulated form of :class:`~teleop_core.middleware.world.Client`."""
+    """Simulated form of :class:`~teleop_core.middleware.platform.Client`."""
 
     def __init__(self, node: "SimulatedNode", name: str) -> None:
         self._node, self.srv_name = node, name
@@ -169,7 +169,7 @@ class Client:
 
 
 class Log:
-    """Log with the interface of :class:`~teleop_core.middleware.world.Log`; the machine stores its lines."""
+    """Log with the interface of :class:`~teleop_core.middleware.platform.Log`; the machine stores its lines."""
 
     def __init__(self, node: "SimulatedNode") -> None:
         self._node = node
@@ -184,7 +184,7 @@ class Log:
 
 
 class SimulatedNode:
-    """Simulated form of :class:`~teleop_core.middleware.world.Node`.
+    """Simulated form of :class:`~teleop_core.middleware.platform.Node`.
 
     Args:
         bus: The simulated middleware.

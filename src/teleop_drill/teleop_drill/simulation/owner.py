@@ -3,7 +3,7 @@
 import struct
 
 from teleop_core.graph.topics import NO_COMMAND_NS, SLAVE_SERVO_JP
-from teleop_core.middleware.world import Taken
+from teleop_core.middleware.platform import Taken
 from teleop_core.nodes.tuned import NodeParameters
 from teleop_drill.simulation.bus import Bus
 from teleop_drill.simulation.ends import Reader

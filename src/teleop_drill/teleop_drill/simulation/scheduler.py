@@ -118,7 +118,7 @@ class Turns:
 
 
 class Lock:
-    """Simulated form of :class:`~teleop_core.middleware.world.Lock`."""
+    """Simulated form of :class:`~teleop_core.middleware.platform.Lock`."""
 
     def __init__(self, scheduler: "Scheduler") -> None:
         self._scheduler, self._waiting = scheduler, list[Strand]()

@@ -197,7 +197,7 @@ def _intrude(stage: DrilledSession, fault: Fault) -> Callable[[], None]:
     place = stage.setpoint + off * drives.speed_limit
 
     def send() -> None:
-        stage.publish(SLAVE_SERVO_JP, form.encode_one(stage.world.time_ns(), place))
+        stage.publish(SLAVE_SERVO_JP, form.encode_one(stage.platform.time_ns(), place))
 
     return stage.every(0.002, send)
 
@@ -214,7 +214,7 @@ def _clutch(stage: DrilledSession, fault: Fault) -> Callable[[], None]:
     pressed = np.array([1.0, float(fault.amount > 0.5), 0.0])
 
     def send() -> None:
-        stage.publish(MASTER_BUTTONS, form.encode_one(stage.world.time_ns(), pressed))
+        stage.publish(MASTER_BUTTONS, form.encode_one(stage.platform.time_ns(), pressed))
 
     return stage.every(0.005, send)
 

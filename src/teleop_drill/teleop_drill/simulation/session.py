@@ -20,8 +20,8 @@ from teleop_core.session.configuration import Configuration
 from teleop_drill.drill.exercise import Master
 from teleop_drill.simulation.bus import Bus
 from teleop_drill.simulation.machine import Process
+from teleop_drill.simulation.platform import SimulatedPlatform
 from teleop_drill.simulation.stand_ins import SimulatedWatch, Work, stand_by
-from teleop_drill.simulation.world import SimulatedWorld
 
 _START = 0.4  # time from the start of a process until its node is created [s]
 _STARTED = 60.0  # time limit for the start [s]
@@ -92,30 +92,30 @@ class SimulatedSession:
         nodes = self._processes[name]
         if RECORDER_NAME in nodes:
             self.recordings.append(self._folder / f"recording_{len(self.recordings) + 1}")
-            self._begun_ns.append(self.observer.world.time_ns())
+            self._begun_ns.append(self.observer.platform.time_ns())
         given = self._given()
 
         def work(process: Process) -> int:
-            world = SimulatedWorld(self._bus, process, given)
+            platform = SimulatedPlatform(self._bus, process, given)
             if name in self._foreign:
-                return self._foreign[name](world)
-            crew = self._crew(nodes, world)
+                return self._foreign[name](platform)
+            crew = self._crew(nodes, platform)
             self.crews[process] = crew
-            watch = SimulatedWatch(world, crew, process)
-            return serve(crew, watch, world)
+            watch = SimulatedWatch(platform, crew, process)
+            return serve(crew, watch, platform)
 
         self.running[name] = self._machine.start(name, work, after=_START)
         self._bus.watch(self.running[name])
 
-    def _crew(self, nodes: tuple[str, ...], world: SimulatedWorld) -> Crew:
+    def _crew(self, nodes: tuple[str, ...], platform: SimulatedPlatform) -> Crew:
         graph = self._configuration.graph
         if len(nodes) > 1:
             own = () if RECORDER_NAME in nodes else nodes
-            return TeleopSession("", own, world, graph)
+            return TeleopSession("", own, platform, graph)
         if nodes[0] in {RECORDER_NAME, FRAMES_NAME}:
-            return make_node(STAGES.find(nodes[0]), world=world)
+            return make_node(STAGES.find(nodes[0]), platform=platform)
         (member,) = (one for one in graph.members if one.name == nodes[0])
-        return make_node(member.stage, namespace=member.arm, world=world)
+        return make_node(member.stage, namespace=member.arm, platform=platform)
 
     def _given(self) -> dict[str, dict[str, Any]]:
         """Parameters of all nodes, as in their parameter file."""
@@ -226,7 +226,9 @@ class SimulatedSession:
 
     def start_bystander(self) -> None:
         """Start a foreign process that subscribes to all streams."""
-        self._bystander = self._machine.start("bystander", lambda process: stand_by(SimulatedWorld(self._bus, process)))
+        self._bystander = self._machine.start(
+            "bystander", lambda process: stand_by(SimulatedPlatform(self._bus, process))
+        )
         self._bus.watch(self._bystander)
         self._machine.scheduler.sleep(0.5)
 

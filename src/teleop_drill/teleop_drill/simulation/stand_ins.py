@@ -12,7 +12,7 @@ from teleop_core.nodes.quality import profile
 from teleop_core.nodes.streams import message_type
 from teleop_core.nodes.watch import Crew
 from teleop_drill.simulation.machine import Process
-from teleop_drill.simulation.world import SimulatedWorld
+from teleop_drill.simulation.platform import SimulatedPlatform
 
 _PERIOD = 0.1
 _END_PATIENCE = 4.0
@@ -22,7 +22,7 @@ class SimulatedWatch:
     """Finds loops that hang, and ends a process that does not end by itself.
 
     Args:
-        world: World of the process.
+        platform: Platform of the process.
         crew: Nodes that are watched.
         process: Process that is ended.
 
@@ -30,16 +30,16 @@ class SimulatedWatch:
         word: Activity of the process.
     """
 
-    def __init__(self, world: SimulatedWorld, crew: Crew, process: Process) -> None:
+    def __init__(self, platform: SimulatedPlatform, crew: Crew, process: Process) -> None:
         self.word = "starting"
-        self._world, self._crew, self._process = world, crew, process
+        self._platform, self._crew, self._process = platform, crew, process
         self._still: dict[Loop, tuple[int, float]] = {}
         self._asked = 0.0
-        world.thread("watch", self._run).start()
+        platform.thread("watch", self._run).start()
 
     def _run(self) -> None:
         while True:
-            self._world.sleep(_PERIOD)
+            self._platform.sleep(_PERIOD)
             if self.word == "at work":
                 self._find_hung()
             self._asked += _PERIOD * self._crew.nodes[0].ended.done()
@@ -64,28 +64,28 @@ class SimulatedWatch:
         self._process.end(1, is_orderly=False)
 
 
-Work = Callable[[SimulatedWorld], int]
-"""Program of a simulated process: a function of the process's world that returns the exit code."""
+Work = Callable[[SimulatedPlatform], int]
+"""Program of a simulated process: a function of the process's platform that returns the exit code."""
 
 
-def run_node(world: SimulatedWorld, stage: str, **values: Any) -> int:
+def run_node(platform: SimulatedPlatform, stage: str, **values: Any) -> int:
     """Run one node as the program of a process until the process is ordered to end; returns the exit code.
 
     Args:
-        world: World of the process.
+        platform: Platform of the process.
         stage: Name of the node's stage.
         values: Parameters of the node, as in a parameter file.
 
     Raises:
         TeleopError: The stage does not exist, or a parameter is wrong.
     """
-    crew = make_node(STAGES.find(stage), values=values, world=world)
-    return serve(crew, SimulatedWatch(world, crew, world.process), world)
+    crew = make_node(STAGES.find(stage), values=values, platform=platform)
+    return serve(crew, SimulatedWatch(platform, crew, platform.process), platform)
 
 
-def stand_by(world: SimulatedWorld) -> int:
+def stand_by(platform: SimulatedPlatform) -> int:
     """Subscribe to all streams until the process is killed."""
-    node, executor = world.node("bystander"), world.executor()
+    node, executor = platform.node("bystander"), platform.executor()
     executor.add_node(node)
     for topic in STREAMS:
         kind = message_type(topic.kind.ros_type)

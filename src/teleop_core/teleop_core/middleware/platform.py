@@ -1,4 +1,4 @@
-"""World: the interface that nodes use for middleware, time and threads.
+"""Platform: the interface that nodes use for middleware, time and threads.
 
 The methods have the same names and meaning as in rclpy and in Python's ``threading``.
 """
@@ -370,7 +370,7 @@ class Executor(Protocol):
         """Serve one event, or nothing if no event comes within the time [s].
 
         Raises:
-            WorldEndedError: The middleware was shut down.
+            PlatformEndedError: The middleware was shut down.
         """
 
     def wake(self) -> None:
@@ -380,11 +380,11 @@ class Executor(Protocol):
         """Stop serving the nodes."""
 
 
-class WorldEndedError(Exception):
+class PlatformEndedError(Exception):
     """The middleware was shut down."""
 
 
-class World(Protocol):
+class Platform(Protocol):
     """Everything outside of the nodes of one process."""
 
     @property
@@ -449,8 +449,8 @@ class World(Protocol):
     def executor(self) -> Executor:
         """Executor for the nodes of this process or of this guest."""
 
-    def guest(self, domain: int | None = None) -> "World":
-        """This world for a guest: a program that is not part of the session and has its own context."""
+    def guest(self, domain: int | None = None) -> "Platform":
+        """This platform for a guest: a program that is not part of the session and has its own context."""
 
     def shutdown(self) -> None:
         """Shut the middleware down."""
@@ -460,8 +460,8 @@ class Owner(Protocol):
     """Owner of publishers and subscriptions: a node of a session, or a guest."""
 
     @property
-    def world(self) -> World:
-        """World of the owner."""
+    def platform(self) -> Platform:
+        """Platform of the owner."""
 
     @property
     def ros(self) -> Node:

@@ -1,4 +1,4 @@
-"""World: the simulated machine as seen by one process, with the interface that nodes use."""
+"""Platform: the simulated machine as seen by one process, with the interface that nodes use."""
 
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -7,7 +7,7 @@ import numpy as np
 
 from teleop_core.base.background import Background
 from teleop_core.graph.layers import RealTimeParameters
-from teleop_core.middleware.world import Hooks
+from teleop_core.middleware.platform import Hooks
 from teleop_drill.simulation.bus import Bus
 from teleop_drill.simulation.disk import Disk
 from teleop_drill.simulation.lifecycle import SimulatedLifecycleNode
@@ -19,8 +19,8 @@ from teleop_drill.simulation.scheduler import Lock, Strand
 _PLACE = "recorder"
 
 
-class SimulatedWorld:
-    """Simulated form of :class:`~teleop_core.middleware.world.World`.
+class SimulatedPlatform:
+    """Simulated form of :class:`~teleop_core.middleware.platform.Platform`.
 
     Args:
         bus: The middleware.
@@ -102,8 +102,8 @@ class SimulatedWorld:
         """Executor of the nodes of this process."""
         return SimulatedExecutor(self.process)
 
-    def guest(self, domain: int | None = None) -> "SimulatedWorld":
-        """This world, because the simulation has a single domain."""
+    def guest(self, domain: int | None = None) -> "SimulatedPlatform":
+        """This platform, because the simulation has a single domain."""
         return self
 
     def shutdown(self) -> None:
