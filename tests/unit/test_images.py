@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from teleop_core.kernels import IS_COMPILED, Fields, PerJoint, kernel, pointer, record, record_array
+from teleop_core.kernels import IS_COMPILED, Fields, PerJoint, kernel, pointer, record, record_array, store
 from teleop_core.kernels.kinds import UNKNOWN, kind_of
 
 pytestmark = pytest.mark.skipif(not IS_COMPILED, reason="nothing is compiled in pure Python")
@@ -97,7 +97,7 @@ def run(folder: Path, text: str, **more: str) -> "subprocess.CompletedProcess[st
 
 
 def test_a_session_runs_without_the_compiler_to_the_same_bits(tmp_path: Path) -> None:
-    kept = {"TELEOP_KERNELS": os.environ.get("TELEOP_KERNELS", str(Path.home() / ".cache/teleop_core/kernels"))}
+    kept = {"TELEOP_KERNELS": str(store.folder() or "")}
     first, second = run(tmp_path, SESSION, **kept), run(tmp_path, SESSION, **kept, FORBID="1")
     assert second.returncode == 0, second.stderr
     assert first.stdout == second.stdout

@@ -25,7 +25,7 @@ def _look(domain: int | None) -> "LookingNode":
     found = chosen_domains(domain)
     if len(found) > 1:
         raise ParameterError("--domain", None, f"one of {', '.join(map(str, found))}: several sessions run here")
-    look: LookingNode = module.Look(found[0])
+    look: LookingNode = module.LookingNode(found[0])
     return look
 
 
