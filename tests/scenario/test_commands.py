@@ -118,32 +118,6 @@ def test_evaluate_prints_a_table_and_writes_json_and_page(teleop_again: "Run", r
     assert "<html" in page.read_text()[:500].lower()
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (["--scenario", "coarse_bix"], ["coarse_bix", "coarse_box", "fine_box"]),
-        (["--set", "fine_gian=0.1"], ["fine_gian", "fine_gain"]),
-        (["--set", "fine_gain=200"], ["fine_gain", "200", "between"]),
-        (["--duration", "-1"], ["duration", "-1", "between"]),
-        (["--config", "/nowhere.yaml"], ["/nowhere.yaml", "No such file"]),
-    ],
-)
-def test_sim_refuses_wrong_input_in_one_line(
-    teleop_again: "Run", tmp_path: Path, arguments: list[str], words: list[str]
-) -> None:
-    line = one_line(teleop_again("sim", *arguments, "--out", tmp_path / "bag", code=2))
-    for word in words:
-        assert word in line
-    assert not (tmp_path / "bag").exists()
-
-
-def test_an_existing_output_is_never_overwritten(teleop_again: "Run", recording: Path, tmp_path: Path) -> None:
-    for command in (("sim",), ("replay", recording)):
-        line = one_line(teleop_again(*command, "--out", recording, code=2))
-        assert "exists" in line
-    assert Bag(recording).topics["slave/measured_js"].count == TICKS
-
-
 def make_foreign(path: Path) -> None:
     with BagWriter(path, [topics.MASTER_BUTTONS], ()) as writer:
         stamps = np.array([1, 2])
@@ -167,8 +141,6 @@ def test_lookups_answer_without_a_session(teleop_again: "Run") -> None:
     assert teleop_again("parameters", "--markdown").stdout.startswith("| parameter")
     assert "rcrt1" in teleop_again("robot").stdout
     assert "theta2" in teleop_again("robot", "rcrt1").stdout
-    assert "rcrt1" in one_line(teleop_again("robot", "r2d2", code=2))
-    assert "motion_scaling" in one_line(teleop_again("parameters", "nobody", code=2))
 
 
 def test_help_imports_no_command_and_nothing_that_takes_long(teleop: "Run") -> None:
@@ -177,37 +149,6 @@ def test_help_imports_no_command_and_nothing_that_takes_long(teleop: "Run") -> N
     assert "COMMAND" in done.stdout
     for module in ("numba", "numpy", "rich", "cyclopts", "yaml", "teleop_core.commands.sessions", "teleop_lab"):
         assert f" {module}\n" not in done.stderr
-
-
-@pytest.mark.parametrize(
-    ("words", "told"),
-    [
-        ([], "teleop: a COMMAND is missing (see teleop --help)"),
-        (["simm"], "teleop simm: COMMAND is 'simm', must be one of: sim, "),
-        (["sim"], 'teleop sim: Command "sim" parameter --out requires an argument (see teleop sim --help)'),
-        (["sim", "--out", "new", "more"], "teleop sim: one argument too many: more (see teleop sim --help)"),
-        (["sim", "--out", "new", "--sed", "1"], "teleop sim: Unknown option: --sed. Did you mean --seed?"),
-        (
-            ["sim", "--out", "new", "--seed", "x"],
-            'teleop sim: Invalid value for --seed: unable to convert "x" into int',
-        ),
-        (["sim", "--out", "new", "--set"], "teleop sim: Command "),
-        (["live", "--out", "new", "--processes", "two"], 'teleop live: Invalid value "two" for --processes. Choose'),
-        (["evaluate"], 'teleop evaluate: Command "evaluate" parameter BAGS requires an argument'),
-        (["stop", "--domain", "300"], "teleop stop: --domain is '300', must be the number of a ROS domain, 0 to 232"),
-    ],
-)
-def test_wrong_use_is_told_in_one_line(words: list[str], told: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.main(words) == 2
-    line = one_line_of(capsys)
-    assert line.startswith(told)
-
-
-def one_line_of(capsys: pytest.CaptureFixture[str]) -> str:
-    captured = capsys.readouterr()
-    assert captured.out == ""
-    (line,) = captured.err.splitlines()
-    return line
 
 
 def test_words_become_typed_options_in_any_order() -> None:

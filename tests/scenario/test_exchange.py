@@ -121,29 +121,3 @@ def test_axes_with_a_minus_are_values_not_options(teleop_again: "Run", hand: Pat
             turn[row, "xyz".index(axis[-1])] = -1.0 if axis[0] == "-" else 1.0
         got = Bag(out).read(MASTER_MEASURED_CP).values[:, :3]
         assert np.allclose(got, 0.5 * PLACES @ turn.T, rtol=0, atol=1e-15)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "text"),
-    [
-        (("import", "{hand}", "--out", "{out}", "--position", "a", "y", "z"), "time, x, y, z, qx"),
-        (("import", "nothing.csv", "--out", "{out}"), "does not exist"),
-        (("import", "{hand}", "--out", "{out}", "--unit", "km"), "must be one of: m, auto, cm, mm, in"),
-        (("import", "{hand}", "--out", "{bag}"), "exists already"),
-        (("console", "--out", "{bag}"), "exists already"),
-        (("export", "{bag}", "--out", "{out}.csv", "--topics", "nowhere"), "master/measured_cp"),
-        (("export", "{bag}", "--out", "{out}"), "lacks slave/measured_js"),
-        (("export", "nothing", "--out", "{out}.csv"), "does not exist"),
-        (("replay", "{bag}/metadata.yaml", "--out", "{out}"), ""),
-    ],
-)
-def test_mistakes_are_one_line_and_leave_nothing(
-    teleop_again: "Run", imported: Any, hand: Path, tmp_path: Path, arguments: tuple[str, ...], text: str
-) -> None:
-    places = {"hand": hand, "out": tmp_path / "out", "bag": imported[0]}
-    done = teleop_again(*(word.format(**places) for word in arguments), code=2)
-    lines = [line for line in done.stderr.splitlines() if not line.startswith("note:")]
-    assert len(lines) == 1, done.stderr
-    assert text in lines[0]
-    assert not done.stdout  # such as the address of a page that never opens
-    assert not list(tmp_path.iterdir())

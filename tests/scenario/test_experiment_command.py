@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from headless import Headless
-from one_line import one_line
 from teleop_lab import experiments
 from teleop_lab.experiments.bench import Bench
 from teleop_lab.experiments.results_page import experiments_page
@@ -44,27 +43,6 @@ def test_json_holds_every_number_exactly(teleop_again: "Run", tmp_path: Path) ->
     found = json.loads(file.read_text(encoding="utf-8"))["experiments"]
     assert [entry["name"] for entry in found] == ["tendons", "resolution"]
     assert found == [experiments.run(name).to_json() for name in ("tendons", "resolution")]
-
-
-@pytest.mark.parametrize(
-    ("arguments", "told"),
-    [
-        (("resolutoin",), "resolution"),
-        (("resolution", "nosuch"), "'nosuch', must be one of"),
-        (("resolution", "--json", "{folder}/no/such.json"), "does not exist"),
-        (("resolution", "--html", "{folder}"), "is a directory"),
-        (("resolution", "--html", "/proc/page.html"), "cannot be written"),
-        (("resolution", "--seed", "-1"), "seed is -1"),
-        (("resolution", "--seed", "one"), "unable to convert"),
-    ],
-)
-def test_wrong_use_is_told_in_one_line_and_writes_nothing(
-    teleop_again: "Run", tmp_path: Path, arguments: tuple[str, ...], told: str
-) -> None:
-    texts = [argument.format(folder=tmp_path) for argument in arguments]
-    done = teleop_again("experiment", *texts, code=2)
-    assert told in one_line(done)
-    assert not list(tmp_path.iterdir())
 
 
 def test_file_that_exists_is_kept_until_the_new_one_is_whole(teleop_again: "Run", tmp_path: Path) -> None:

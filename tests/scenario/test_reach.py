@@ -13,7 +13,6 @@ from scipy.spatial.transform import Rotation
 
 import teleop_core as tc
 import teleop_lab as lab
-from one_line import one_line
 from people import PEOPLE, moves, person, recorded, saved
 from present import present
 from teleop_core.graph.topics import Limit
@@ -237,22 +236,6 @@ def test_what_the_command_prints_and_writes_is_what_replay_takes(tmp_path: Path,
     assert "against time" in text
     assert "proposed" in text
     assert "too fast for the joints" in text
-
-
-@pytest.mark.slow
-def test_the_command_tells_wrong_use_in_one_line(tmp_path: Path, teleop_again: "Run") -> None:
-    bag = saved("da_vinci_30", 2.0, tmp_path)
-    for arguments, expected in (
-        (["nothing"], "recording or scenario is 'nothing'"),
-        (["bags/missing"], "bags/missing: does not exist; give a recording"),
-        ([bag, "--robot", "nobody"], "must be one of: rcrt1"),
-        ([bag, "--share", "0"], "--share 0 must be above 0"),
-        ([bag, bag, "--out", tmp_path / "x.yaml"], "--out writes the proposal for one"),
-        ([bag, "--html", tmp_path / "no" / "x.html"], "make it first"),
-        ([bag, "--arm", "left"], "arm of"),
-    ):
-        assert expected in one_line(teleop_again("reach", *arguments, code=2))
-    assert not (tmp_path / "x.yaml").exists()
 
 
 def test_axes_stay_where_a_camera_is_fixed() -> None:

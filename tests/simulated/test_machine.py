@@ -255,7 +255,7 @@ def test_a_kernel_reads_the_same_clocks_as_python(offset_ns: int, drift: float) 
 
 def test_kernels_take_and_publish_in_a_simulated_session_themselves(peer: SimulatedPeer) -> None:
     session = peer.side("slave", "slave_sim")
-    ports = [node.ports for node in session.crew.nodes]  # type: ignore[union-attr]
+    ports = [node.ports for node in session.crew.nodes]  # type: ignore[attr-defined, union-attr]
     assert not any(entry.own["needs_python"] for one in ports for entry in one.all_inputs() if entry.subscription)
     assert all(out.is_direct for one in ports for out in one.outputs.values())
 

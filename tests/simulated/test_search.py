@@ -153,20 +153,6 @@ def test_a_schedule_that_cannot_be_run_is_refused_by_the_value_that_is_wrong(cha
     assert needed in str(error.value)
 
 
-@pytest.mark.parametrize("text", ["{", '{"version": 1', "[" * 5])
-def test_a_text_that_is_no_schedule_is_refused_in_one_line(text: str, tmp_path: Path, teleop_again: Any) -> None:
-    (tmp_path / "file.json").write_text(text, encoding="utf-8")
-    done = teleop_again("drill", "--schedule", str(tmp_path / "file.json"), code=2)
-    assert "JSON of a schedule" in done.stderr
-    assert len(done.stderr.strip().splitlines()) == 1
-
-
-def test_a_schedule_that_is_no_file_is_refused_in_one_line(teleop_again: Any) -> None:
-    done = teleop_again("drill", "--schedule", "nowhere.json", code=2)
-    assert "nowhere.json: cannot be read as a schedule" in done.stderr
-    assert len(done.stderr.strip().splitlines()) == 1
-
-
 # -- store ---------------------------------------------------------------------------------------
 
 

@@ -118,38 +118,17 @@ def test_many_schedules_are_told_as_a_table_of_faults_and_states(tmp_path: Path)
     assert {name.split(" / ")[0] for name in found["under"]} <= set(drawn)
 
 
+@pytest.mark.soak
 def test_of_three_seeds_the_one_is_run_whose_faults_have_met_least(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(seeds, "_ROUND", 1)
     ran = [found.seed for found in seeds.run_seeds(30, 2, 1)]
     assert ran[0] == 30
-    met = Counter((one.kind, "ENABLED") for one in draw(30, SIDES))
     assert all(33 + 3 * k <= seed < 36 + 3 * k for k, seed in enumerate(ran[1:]))
+
+
+def test_a_seed_is_known_once_each_of_its_faults_has_met_every_state() -> None:
+    met = Counter((one.kind, "ENABLED") for one in draw(30, SIDES))
     assert seeds._known(30, met, Processes.SIDES) == 0.0  # in other states they met nothing
     for state in State:
         met.update((one.kind, state.name) for one in draw(30, SIDES))
     assert seeds._known(30, met, Processes.SIDES) >= 1.0
-
-
-@pytest.mark.parametrize(
-    ("words", "needed"),
-    [
-        (["--seeds", "2", "--out", "bags"], "--schedule or --seeds 1"),
-        (["--seeds", "2", "--search", "store"], "without names, --short, --drives and --search or --schedule"),
-        (["--search", "store", "--composed"], "without --composed"),
-        (["--search", "store", "--minutes", "nan"], "above 0"),
-        (["--search", "store", "--seed", "today"], "seed"),
-        (["--seeds", "2", "stop_topic"], "without names"),
-        (["--seed", "3", "stop_topic"], "with --simulated"),
-    ],
-)
-def test_arguments_that_do_not_go_together_are_refused_in_one_line(words: Any, needed: Any, teleop_again: Any) -> None:
-    done = teleop_again("drill", *words, code=2)
-    assert needed in done.stderr
-    assert len(done.stderr.strip().splitlines()) == 1
-
-
-@pytest.mark.parametrize("count", ["0", "-1"])
-def test_no_schedules_are_refused_and_start_no_session(count: str, teleop_again: Any) -> None:
-    done = teleop_again("drill", "--seeds", count, code=2)
-    assert not done.stdout
-    assert f"--seeds is {count}, must be at least 1" in done.stderr

@@ -20,7 +20,8 @@ PROGRAM = "copies:be_program"
 @cache
 def _starter() -> Starter:
     """Process that has loaded what commands and most examples need; it ends with this one."""
-    made = Starter(configure("coarse_box").text(), os.environ | {"PYTHONPATH": str(Path(__file__).parent)})
+    paths = [path for path in (os.environ.get("PYTHONPATH"), str(Path(__file__).parent)) if path]
+    made = Starter(configure("coarse_box").text(), os.environ | {"PYTHONPATH": os.pathsep.join(paths)})
     atexit.register(made.close)
     return made
 

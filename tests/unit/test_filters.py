@@ -28,33 +28,6 @@ def filtered(values: Any, start: float = 0.0, gain: float = GAIN, zero: float = 
     return np.array(out)
 
 
-def test_coefficients_are_the_published_ones() -> None:  # case 21
-    published = {"c": 0.99, "last": -0.09, "now": 0.1}
-    assert math.isclose(lag_step(0.0, 0.0, 1.0, GAIN, ZERO, POLE, DT), published["c"])
-    assert math.isclose(lag_step(0.0, 1.0, 0.0, GAIN, ZERO, POLE, DT), published["last"])
-    assert math.isclose(lag_step(1.0, 0.0, 0.0, GAIN, ZERO, POLE, DT), published["now"])
-
-
-def test_unit_step_runs_through_the_published_values_to_one() -> None:  # case 21
-    output = filtered(np.ones(3000))
-    assert np.allclose(output[:3], (0.1, 0.109, 0.11791), rtol=0, atol=ROUNDING)
-    # 0.99^3000 = 8e-14 is left after 3 s.
-    assert math.isclose(output[-1], 1.0, abs_tol=1e-12)
-    assert (np.diff(output) >= 0.0).all()
-
-
-@pytest.mark.parametrize("hertz", [50.0, 100.0, 200.0, 400.0])
-def test_gain_above_50_hz_is_a_tenth(hertz: float) -> None:  # case 21
-    z = np.exp(2j * math.pi * hertz * DT)
-    gain = abs((0.1 - 0.09 / z) / (1.0 - 0.99 / z))
-    times = np.arange(2000) * DT
-    output = filtered(np.sin(2.0 * math.pi * hertz * times))[1000:]
-    # RMS over whole periods, times the root of two.
-    measured = math.sqrt(2.0 * np.mean(output**2))
-    assert math.isclose(gain, 0.1, abs_tol=0.01)
-    assert math.isclose(measured, gain, rel_tol=1e-3)
-
-
 def test_gimbal_noise_comes_out_at_a_quarter_or_less() -> None:
     noise = np.random.default_rng(1).uniform(-2e-3, 2e-3, 20_000)
     # ±2e-3 rad becomes ±5e-4 rad in the source.

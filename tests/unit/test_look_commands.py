@@ -17,14 +17,3 @@ def test_info_names_every_topic_with_its_type_and_count(capsys: pytest.CaptureFi
     with AnyReader([EXAMPLE]) as reader:
         found = {name.strip("/"): (info.msgcount, info.msgtype) for name, info in reader.topics.items()}
     assert told == found
-
-
-@pytest.mark.parametrize(
-    "words", [["topic", "hz"], ["param", "get", "slave"], ["param", "set", "slave", "mode"], ["service", "call"]]
-)
-def test_word_that_is_missing_is_named_in_one_line(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
-    pytest.importorskip("rclpy")
-    assert main([*words, "--domain", "97"]) == 2
-    told = capsys.readouterr().err
-    assert "given for" in told
-    assert told.count("\n") == 1

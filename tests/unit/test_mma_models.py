@@ -19,15 +19,6 @@ PLACE, TURN = 0.05 * MM, 1e-4
 # Sums of a dozen products of lengths below 1 m.
 EXACT = 1e-12
 SERIAL_HOME = np.radians([0.0, -90.0, 90.0, 0.0, 90.0, 0.0, 0.0])
-# Frame: table 4.7 model, prototype, recomputed model [mm].
-TABLE_4_7 = {
-    "4": ((160.7, 0, 325.2), (158.5, 0, 323.5), (160.76, 0, 325.23)),
-    "5": ((160.7, 0, 393.1), (158.5, 0, 391.0), (160.76, 0, 393.05)),
-    "6": ((160.7, -20.1, 393.1), (158.5, -22.9, 391.0), (160.76, -20.11, 393.05)),
-    "8": ((160.7, -55.2, 418.3), (158.5, -56.6, 417.2), (160.76, -55.18, 418.29)),
-    "9": ((122.4, -55.2, 418.3), (124, -56.6, 417.5), (122.36, -55.18, 418.29)),
-    "12": ((3.6, -71.3, 482.1), (3.6, -72.9, 481.5), (3.63, -71.27, 482.08)),
-}
 
 
 @pytest.fixture(scope="module")
@@ -46,12 +37,6 @@ def random_readings(count: int, seed: int = 0) -> Array:
 def tool_of_model(mma: Robot, q: Array, model: str) -> Array:
     table = mma_models.model_table(model, mma.geometry)
     return list(mma_models.frames(table, mma_models.joints_of_model(q, model)).values())[-1]
-
-
-@pytest.mark.parametrize("name", TABLE_4_7)
-def test_dummy_frames_at_home_stand_where_recomputed(mma: Robot, name: str) -> None:  # H1
-    origin = serial_frames(mma, SERIAL_HOME)[name][:3, 3]
-    assert np.abs(origin - np.array(TABLE_4_7[name][2]) * MM).max() < PLACE
 
 
 def test_dummy_frames_turn_the_tool_by_half_a_turn_at_home(mma: Robot) -> None:  # H1

@@ -7,7 +7,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from teleop_core.base.errors import ParameterError
 from teleop_core.kernels.geometry import Array, roll_pitch_yaw, rotation, transform
 from teleop_core.robots import IkStatus, load_robot
 from teleop_core.robots.arms.rcrt1_hardware import tendon_joint_angles, tendon_motor_angles
@@ -26,15 +25,6 @@ PUBLISHED = {
     4: ((-30, 130, 350, 45, 45, 45), (248.5033, -122.1115, -255.9647)),
     5: ((-45, 143.715, 375, 80.214, 80.214, 80.214), (181.4317, -130.6174, -311.0181)),
     6: ((30, 130, 400, 45, 45, 45), (263.1740, 173.3056, -288.1041)),
-}
-# Printed matrices, equations 7.3.1-7.3.6, rows n o a.
-ROTATIONS = {
-    1: ((-0.497, 0.686, -0.532), (-0.220, 0.493, 0.842), (0.840, 0.535, -0.094)),
-    2: ((-0.257, 0.783, -0.567), (0.020, 0.590, 0.807), (0.966, 0.196, -0.167)),
-    3: ((0.063, 0.733, 0.677), (0.949, -0.254, 0.186), (0.309, 0.631, -0.712)),
-    4: ((0.177, 0.880, 0.441), (0.884, -0.340, 0.323), (0.434, 0.332, -0.838)),
-    5: ((0.619, 0.422, 0.662), (-0.342, -0.614, 0.711), (0.707, -0.667, -0.236)),
-    6: ((-0.677, 0.734, -0.059), (0.595, 0.593, 0.543), (0.434, 0.332, -0.838)),
 }
 # Case 8: fixed angles of the same poses (degrees).
 ROLL_PITCH_YAW = {
@@ -126,15 +116,6 @@ def test_right_angled_postures_have_the_tip_where_a_ruler_would(
     assert np.allclose(pose[:3, 2], approach, rtol=0, atol=ROUNDING)
 
 
-@pytest.mark.parametrize("point", PUBLISHED)
-def test_published_poses_reproduce(point: int) -> None:  # case 7
-    posture, tip = PUBLISHED[point]
-    pose = ARM.fk(joints(*posture))
-    # The case's own tolerances: matrices are printed to three digits, tips to 1 µm.
-    assert np.allclose(pose[:3, 3] / MM, tip, rtol=0, atol=1e-3)
-    assert np.allclose(pose[:3, :3], ROTATIONS[point], rtol=0, atol=1e-3)
-
-
 @pytest.mark.parametrize("point", ROLL_PITCH_YAW)
 def test_fixed_angles_of_the_published_poses_reproduce(point: int) -> None:  # case 8
     angles = roll_pitch_yaw(ARM.fk(joints(*PUBLISHED[point][0]))[:3, :3])
@@ -203,15 +184,6 @@ def test_shoulder_offset_keeps_the_inverse_an_inverse(offset: float, q: Array) -
     assert np.allclose(arm.fk(branches), pose, rtol=0, atol=1e-12)
 
 
-def test_tendon_ratios_of_the_printed_radii_pull_both_motors() -> None:
-    # r5* = 3.5, r5 = 2.5, r6* = 1.8, r6 = 2.5 mm.
-    ratios = {"ratio5": 2.5 / 3.5, "ratio6": 2.5 / 1.8, "coupling": 2.5 / 1.8}
-    angles = np.array([0.7, 0.0])
-    assert np.array_equal(tendon_motor_angles(angles), angles)  # published numbers have no coupling
-    motors = tendon_motor_angles(angles, **ratios)
-    assert np.allclose(motors, (0.5, 0.7 * 2.5 / 1.8), rtol=0, atol=ROUNDING)
-
-
 @given(
     st.lists(st.floats(-3.0, 3.0), min_size=2, max_size=2),
     st.floats(0.1, 5.0),
@@ -225,12 +197,3 @@ def test_joint_angles_come_back_from_the_motor_angles(
     back = tendon_joint_angles(tendon_motor_angles(np.array(angles), **ratios), **ratios)
     # Products up to 15 divided by ratios down to 0.1.
     assert np.allclose(back, angles, rtol=0, atol=1e-12)
-
-
-@pytest.mark.parametrize("name", ["ratio5", "ratio6"])
-@pytest.mark.parametrize("ratio", [0.0, math.nan])
-def test_tendon_ratio_that_turns_nothing_is_refused(name: str, ratio: float) -> None:
-    for convert in (tendon_motor_angles, tendon_joint_angles):
-        with pytest.raises(ParameterError) as error:
-            convert(np.zeros(2), **{name: ratio})
-        assert error.value.name == name

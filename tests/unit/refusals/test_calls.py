@@ -31,6 +31,7 @@ from teleop_core.hand.tasks.insert import InsertParameters
 from teleop_core.kernels.geometry import checked_array
 from teleop_core.robots import load_robot, parse_table, robot_from_table
 from teleop_core.robots.arms.as_chain import true_chain
+from teleop_core.robots.arms.rcrt1_hardware import tendon_joint_angles, tendon_motor_angles
 from teleop_core.robots.drives import ENTRIES, Drives, independent_axes
 from teleop_core.robots.hardware import Hardware
 from teleop_core.robots.inertias import LinkInertia, check_possible
@@ -222,6 +223,8 @@ CASES = [
     *of(partial(replace, robot_from_table(CHAIN)), "^drives must have", drives=electric_cylinders(2)),
     (partial(load_robot, "r2d2"), "one of: .*rcrt1"), (partial(load_robot, "cubes.xml", drive="magic"), "effort"),
     (partial(load_robot, "mma", d7=-0.03507, d9=-0.03840), "^d7 is"),  # signed offsets have no closed form
+    *((partial(convert, np.zeros(2), **{name: ratio}), f"^{name} is") for name in ("ratio5", "ratio6")
+      for convert in (tendon_motor_angles, tendon_joint_angles) for ratio in (0.0, math.nan)),
     # sessions step by step, and commands
     *((lambda move=move: tc.Session().command(**move), words) for move, words in (
         ({"place": [0.0, 0.0]}, "place"), ({"place": [0.5, 0.0, 0.0]}, "-0.08 to 0.08"),
