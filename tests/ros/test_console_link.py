@@ -13,8 +13,8 @@ from teleop_console.console_session import ConsoleSession
 from teleop_console.link import box_of
 from teleop_core.bags.reader import Bag
 from teleop_core.base.errors import ParameterError, SessionError
-from teleop_core.evaluation.metrics.counts import PHASES
 from teleop_core.graph import topics
+from teleop_core.graph.signals import PHASES
 from teleop_core.graph.topics import JAW_TOPICS, PASSIVITY_TOPICS, SCENE_TOPICS, TASK_TOPICS
 from teleop_core.nodes.children import free_domain
 from teleop_core.nodes.display import SEEN

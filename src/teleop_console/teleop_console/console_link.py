@@ -21,8 +21,8 @@ from teleop_console.picture_streams import PictureStreams
 from teleop_core.bags.messages import read_numbers, read_reports
 from teleop_core.bags.recording import MARKS
 from teleop_core.base.errors import ParameterError, SessionError
-from teleop_core.evaluation.metrics.counts import PHASES
 from teleop_core.graph.graph import RECORDER_NAME
+from teleop_core.graph.signals import PHASES
 from teleop_core.graph.topics import OPERATION, SLAVE_OPERATION, TELEOP_STATE
 from teleop_core.kernels.geometry import Array
 from teleop_core.middleware.platform import Platform, PlatformEndedError

@@ -20,6 +20,8 @@ TICK_NS = 1_000_000
 """Control period of every stage unless a session says otherwise [ns]."""
 DT: float = TICK_NS / 1e9
 """The control period in seconds."""
+PHASES = ("take", "step", "give", "tell")
+"""Phases of a tick of a live process, whose times its nodes report."""
 
 STATE_FIELDS = TELEOP_STATE.columns
 STATE = {name: index for index, name in enumerate(STATE_FIELDS)}

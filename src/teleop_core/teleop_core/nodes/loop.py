@@ -12,7 +12,7 @@ from dataclasses import replace
 from typing import Any
 
 from teleop_core.base.errors import TeleopError
-from teleop_core.evaluation.metrics.counts import PHASES
+from teleop_core.graph.signals import PHASES
 from teleop_core.graph.stage import Stage
 from teleop_core.graph.topics import Kind
 from teleop_core.middleware.platform import Platform

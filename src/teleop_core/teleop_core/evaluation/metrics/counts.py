@@ -9,6 +9,7 @@ from teleop_core.evaluation import MISSING, TRACKED, Context, Key, Metric, Table
 from teleop_core.evaluation.metric import figure
 from teleop_core.evaluation.stamps import StampTallies
 from teleop_core.graph.graph import RECORDER_NAME
+from teleop_core.graph.signals import PHASES
 from teleop_core.graph.topics import DIAGNOSTICS, SLAVE_MEASURED_CP
 
 Counts = dict[str, dict[str, int]]
@@ -46,8 +47,6 @@ def _is_whole(text: str) -> bool:
 
 
 GROUP = "counts"
-PHASES = ("take", "step", "give", "tell")
-"""Phases of a tick of a live process, whose times its nodes report."""
 _FORMER = "slave_sim"  # the node that counted the ticks in versions without an arm server
 
 
