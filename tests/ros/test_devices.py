@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from ros.conftest import Peer
 
 pytestmark = pytest.mark.ros
-NODE = SimpleNamespace(ros=SimpleNamespace(get_logger=lambda: get_logger("devices")), world=ROS)
+NODE = SimpleNamespace(ros=SimpleNamespace(get_logger=lambda: get_logger("devices")), platform=ROS)
 
 
 @pytest.fixture
