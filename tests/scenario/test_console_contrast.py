@@ -164,6 +164,7 @@ def test_texts_and_controls_of_a_session_stand_out_by_day_and_by_night(tab: Any,
                 tab.until("document.documentElement.dataset.mantineColorScheme === 'dark'")
 
 
+@pytest.mark.soak
 def test_focus_is_seen_wherever_the_tab_key_leads_in_a_session(tab: Any) -> None:
     with session() as (server, _):
         tab.resize(*SIZES["desk"])
