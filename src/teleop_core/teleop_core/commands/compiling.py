@@ -20,7 +20,7 @@ class Job(NamedTuple):
 _MESH = "OFF\n4 4 6\n0 0 0\n90 90 0\n90 0 90\n0 90 90\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n"
 """A closed surface of four triangles [mm], for parts that need a file."""
 _AXES = "0 0 1", "0 1 0"
-_PAIR = "pair"
+_PAIR, _MESSAGES = "pair", "messages"
 """Stage of a job for a server and its simulated arm as one object."""
 
 
@@ -63,7 +63,7 @@ def phases_of() -> Iterator[Sequence[Job]]:
     from teleop_core.graph.graph import BUILT_IN
     from teleop_core.graph.layers import list_scenarios
 
-    yield [Job(stage=stage) for stage in reversed(BUILT_IN)]
+    yield [*(Job(stage=stage) for stage in reversed(BUILT_IN)), Job(stage=_MESSAGES)]
     seven, six, puma = (Job(texts=(f"robot={name}",)) for name in ("arm7.urdf", "arm6.urdf", "puma560"))
     yield [seven, *map(Job, list_scenarios()), six, puma]  # arms that share kernels follow one another
     yield [Job(stage=_PAIR), *(Job(texts=texts) for texts in _parts())]
@@ -186,6 +186,11 @@ def _compile_stage(stage: str, configuration: "Configuration") -> None:
 
     if stage == _PAIR:
         SimulatedArm(ArmParameters()).load()
+        return
+    if stage == _MESSAGES:
+        from teleop_core.nodes.ports import load_all
+
+        load_all()
         return
     runner = STAGES.find(stage).run(configuration.groups[stage], DT)
     runner.load()

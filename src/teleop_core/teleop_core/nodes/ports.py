@@ -14,12 +14,12 @@ from teleop_core.graph.signals import make_signals
 from teleop_core.graph.stage import Stage
 from teleop_core.graph.topics import BY_NAME, PORTS_BETWEEN_ARMS, Kind, Quality, Topic
 from teleop_core.kernels import held, records
-from teleop_core.kernels.fields import Cells
+from teleop_core.kernels.fields import Cells, record
 from teleop_core.kernels.geometry import Array
 from teleop_core.middleware.platform import Platform, Publisher
 from teleop_core.nodes import wire
 from teleop_core.nodes.feed import NO_BLOCK, Feed
-from teleop_core.nodes.streams import READING, WRITING, Input, Output, Tap, calls_of
+from teleop_core.nodes.streams import READING, WRITING, Input, Output, Tap, calls_of, load
 
 Feeds = Callable[[str], list[tuple[str, float]]]
 """Function from a port to the topics that feed it, each with its delay [s]."""
@@ -285,3 +285,19 @@ def _nothing(*_: object) -> Any:
 
 NO_PORTS = Ports(None, "", Stage("none", NoParameters, (), ()), make_signals((), 0)[0], (), _nothing, _nothing)
 """Ports of a node that is not configured."""
+
+
+def load_all() -> None:
+    """Load all kernels that take, read, write and send the messages of nodes; they serve every graph."""
+    load()
+    own, written, calls = records(READING, 1), records(WRITING, 1), record(wire.Calls)
+    words, given = np.zeros(2, np.int64), np.zeros(6, np.int64)
+    held(wire.take_raw, np.zeros((1, 1), np.int64), calls, words)
+    for kernel in (wire.answer_take, wire.answer_newest):
+        held(kernel, own[0], calls)
+    for judge in (wire.look, wire.answer_accept):
+        held(judge, own[0], given)
+    held(wire.read_all, own, calls, words)
+    held(wire.write_all, written, calls, words, words)
+    held(wire.are_sound, written, words)
+    held(wire.send_all, written, calls, NO_BLOCK, words)
