@@ -287,7 +287,7 @@ CODE_MUTANTS = (
     _mutant("image_damaged", "damaged code is run", "kernels/images.py",
             "if _sum(data[_CHECK:]) != data[:_CHECK]:", "if False:", "images"),
     _mutant("image_of_old", "code of an older source is run", "kernels/images.py",
-            'if kept["stamp"] == stamp and', "if", "shipped_kernels"),
+            'if kept["stamp"] == stamp and', "if", "images"),
     _mutant("kinds_alike", "code for a table is run for its transpose", "kernels/kinds.py",
             '"C" if flags.c_contiguous else "F" if flags.f_contiguous else "A"', '"C"', "images"),
     _mutant("kernels_kept", "kernels are thrown away while they are used", "kernels/store.py",

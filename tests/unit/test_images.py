@@ -125,6 +125,14 @@ def test_a_damaged_image_is_made_again(tmp_path: Path) -> None:
     assert run(tmp_path, OWN, FORBID="1").returncode == 0
 
 
+def test_code_of_an_older_source_is_not_run(tmp_path: Path) -> None:
+    first = run(tmp_path, OWN, TELEOP_KERNELS="")  # beside the source, where all versions have one name
+    assert list(tmp_path.rglob("__pycache__/*.nbo"))
+    later = run(tmp_path, OWN.replace("2.0 * x", "3.0 * x"), TELEOP_KERNELS="")
+    assert later.returncode == 0
+    assert later.stdout.splitlines()[0] != first.stdout.splitlines()[0]
+
+
 class Pair(NamedTuple):
     first: float
     second: Any
