@@ -288,6 +288,8 @@ CODE_MUTANTS = (
             "if _sum(data[_CHECK:]) != data[:_CHECK]:", "if False:", "images"),
     _mutant("image_of_old", "code of an older source is run", "kernels/images.py",
             'if kept["stamp"] == stamp and', "if", "images"),
+    _mutant("kinds_kept", "each new type of records takes memory for good", "kernels/kinds.py",
+            "        if len(_dtypes) >= _MOST:\n            _dtypes.clear()\n", "", "images"),
     _mutant("kinds_alike", "code for a table is run for its transpose", "kernels/kinds.py",
             '"C" if flags.c_contiguous else "F" if flags.f_contiguous else "A"', '"C"', "images"),
     _mutant("kernels_kept", "kernels are thrown away while they are used", "kernels/store.py",

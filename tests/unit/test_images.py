@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from teleop_core.kernels import IS_COMPILED, Fields, PerJoint, kernel, pointer, record, record_array, store
+from teleop_core.kernels import IS_COMPILED, Fields, PerJoint, kernel, kinds, pointer, record, record_array, store
 from teleop_core.kernels.kinds import UNKNOWN, kind_of
 
 pytestmark = pytest.mark.skipif(not IS_COMPILED, reason="nothing is compiled in pure Python")
@@ -193,12 +193,19 @@ VALUES: list[Any] = [
 def test_two_values_have_one_kind_exactly_if_the_compiler_gives_them_one_type() -> None:
     from teleop_core.kernels.compiler import types_of
 
-    kinds = [kind_of(value) for value in VALUES]
+    found = [kind_of(value) for value in VALUES]
     types = types_of(tuple(VALUES))
-    for (a, kind, type_a), (b, other, type_b) in combinations(zip(VALUES, kinds, types, strict=True), 2):
+    for (a, kind, type_a), (b, other, type_b) in combinations(zip(VALUES, found, types, strict=True), 2):
         if UNKNOWN not in (kind, other):
             assert (kind == other) == (type_a == type_b), (a, b, kind, other)
-    assert kinds.count(UNKNOWN) == 2
+    assert found.count(UNKNOWN) == 2
+
+
+def test_new_types_of_records_take_no_more_and_more_memory() -> None:
+    for _ in range(5000):
+        kind_of(record_array(Plain, 2))
+    assert max(len(kinds._dtypes), len(kinds._arrays)) <= kinds._MOST
+    assert kind_of(record(Plain)) == kind_of(record(Plain)) != kind_of(record(Counted))
 
 
 def test_a_value_that_only_the_compiler_knows_has_no_kind() -> None:

@@ -20,6 +20,7 @@ UNKNOWN = "?"
 _arrays: dict[tuple[int, int, int], tuple[Any, str]] = {}
 """Kinds of arrays, by the identity of their NumPy type, which is kept, the number of axes and the flags."""
 _dtypes: dict[int, tuple[Any, str]] = {}
+_MOST = 4096  # of each: a program of many sessions makes new NumPy types in each, and those that are kept take memory
 _DECLARED = re.compile(r"\w+(?:\[[^\]]*\])?")
 
 
@@ -77,6 +78,8 @@ def _array_kind(value: Any) -> str:
     else:
         return UNKNOWN
     made = _array_text(name, value.ndim, layout, flags.writeable)
+    if len(_arrays) >= _MOST:
+        _arrays.clear()
     _arrays[id(dtype), value.ndim, flags.num] = dtype, made
     return made
 
@@ -89,6 +92,8 @@ def _record_kind(dtype: Any) -> str:
     """Kind of a record, by the identity of its NumPy type, which is kept."""
     known = _dtypes.get(id(dtype))
     if known is None:
+        if len(_dtypes) >= _MOST:
+            _dtypes.clear()
         known = _dtypes[id(dtype)] = dtype, f"record({hexdigest([_described(dtype)])})"
     return known[1]
 
