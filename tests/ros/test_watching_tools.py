@@ -24,6 +24,7 @@ REST = [0.0, -0.06, -0.08, 1.0, 0.0, 0.0, 0.0]
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
+@pytest.mark.soak
 def test_a_session_shows_and_records_the_robot_that_it_hears(peer: "Peer", tmp_path: Path) -> None:
     robot = load_robot("rcrt1")
     recorder = peer.start("recorder", out=str(tmp_path / "bag"))
