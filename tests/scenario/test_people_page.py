@@ -63,7 +63,7 @@ def served(plan: Plan, tmp_path: Path) -> Iterator[tuple[ConsoleServer, PeoplePa
 
 @browser
 @pytest.mark.slow
-@pytest.mark.parametrize("size", SIZES)
+@pytest.mark.parametrize("size", [*SIZES[:2], pytest.param(SIZES[2], marks=pytest.mark.soak)])
 def test_participant_gets_to_the_questions_and_answers_by_keys_alone(
     tab: Any, served: tuple[ConsoleServer, PeoplePage, Journal], size: tuple[int, int]
 ) -> None:
@@ -91,6 +91,26 @@ def test_participant_gets_to_the_questions_and_answers_by_keys_alone(
     tab.key("Enter")
     tab.shows("Trial 4 of 6 · practice")
     assert journal.answers("p01", 3) == {question.name: 55.0 for question in TLX}
+    assert not tab.faults()
+
+
+@browser
+@pytest.mark.slow
+def test_what_is_new_has_the_focus_also_after_the_page_was_hidden_or_moved(
+    tab: Any, served: tuple[ConsoleServer, PeoplePage, Journal]
+) -> None:
+    server, _, _ = served
+    tab.visit(server.url)
+    tab.shows("I agree and take part")
+    new = "document.activeElement.matches('.t-text')"
+    tab.until(new)
+    for loses in (
+        "dispatchEvent(new CustomEvent('teleop', { detail: { chooses: false } }))",
+        "dispatchEvent(new Event('DOMContentLoaded'))",
+        "document.body.append(document.querySelector('#t-start')); dispatchEvent(new Event('DOMContentLoaded'))",
+    ):
+        tab.value(loses)
+        tab.until(new)
     assert not tab.faults()
 
 

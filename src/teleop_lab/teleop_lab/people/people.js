@@ -34,7 +34,7 @@
     paused: 'A break. It goes on when the person who conducts the study says so.',
     thanks: 'That was all. Thank you for taking part!',
   };
-  let shown = '', drives = false, changed = () => {};
+  let shown = '', drives = false, changed = () => {}, acted = 0; // an answer to what was asked before an act is old
 
   function scale({ name, text, low, high }) {
     const field = made('fieldset', '', { className: 't-scale' }), row = made('div'), input = made('input');
@@ -64,7 +64,9 @@
     const go = button(BUTTONS[step], async () => {
       go.disabled = true;
       const words = questions ? Object.fromEntries([...page.querySelectorAll('input')].map((e) => [e.name, e.value])) : {};
+      acted += 1;
       const next = await ask('go', { step, at, ...words });
+      acted += 1;
       changed();
       if (next) participant(next);
     }, { id: 't-begin' });
@@ -83,8 +85,11 @@
     changed();
     page.scrollTop = 0;
     one('.t-text').tabIndex = -1;
-    one('.t-text').focus(); // so that a screen reader says what is new
+    announce();
   }
+
+  // A screen reader says what has the focus. A page that is hidden or moved loses it, so it is given again.
+  const announce = () => one('.t-text')?.focus();
 
   // -- who conducts ---------------------------------------------------------------------------
 
@@ -137,8 +142,9 @@
   }
 
   async function look() {
+    const before = acted;
     const now = await ask(conducts ? 'conducting' : 'people', conducts ? { key } : {});
-    if (now) (conducts ? conductor : participant)(now);
+    if (now && acted === before) (conducts ? conductor : participant)(now);
   }
 
   if (conducts) {
@@ -158,7 +164,9 @@
     bar.append(told, made('p'), over);
     document.documentElement.append(bar);
     addEventListener('teleop', ({ detail }) => {
+      const wasHidden = page.hidden;
       page.hidden = !detail.chooses;
+      if (wasHidden && detail.chooses) announce();
       drives = Boolean(detail.drives && window.teleopPage);
       changed();
       document.documentElement.classList.toggle('t-choosing', detail.chooses);
@@ -169,6 +177,6 @@
     });
   }
   document.documentElement.append(page);
-  addEventListener('DOMContentLoaded', () => document.body.append(page, bar));
+  addEventListener('DOMContentLoaded', () => { document.body.append(page, bar); announce(); });
   (async () => { for (;;) { await look(); await new Promise((done) => setTimeout(done, 700)); } })();
 })();
