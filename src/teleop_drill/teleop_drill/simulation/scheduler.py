@@ -175,6 +175,7 @@ class Scheduler:
         now = np.full(1, BEGIN_NS)
         self._now, self.now_at = now.data, int(now.ctypes.data)
         self.error: BaseException | None = None
+        self._randoms: list[tuple[str, Random]] = []
         self._breaking = self.random("breaks")
         self.costs = Costs(self.random("costs"))
         self._queue: list[tuple[int, int, Any, int, bool]] = []
@@ -185,7 +186,15 @@ class Scheduler:
 
     def random(self, name: str) -> Random:
         """Random generator for one purpose only."""
-        return Random(f"{self.seed}/{name}")
+        made = Random(f"{self.seed}/{name}")
+        self._randoms.append((name, made))
+        return made
+
+    def seed_again(self, seed: int) -> None:
+        """Let all random generators go on from another seed."""
+        self.seed = seed
+        for name, one in self._randoms:
+            one.seed(f"{seed}/{name}")
 
     @property
     def now_ns(self) -> int:
