@@ -238,6 +238,7 @@ class _Run:
         self._stage.session.close()
         if not (was_killed or self._was("clock step") or self._was("clock drift")):
             self._laws.judge_recording(first, {} if recorder is None else recorder.values())
+        self._laws.finish()
         self._found.broken = tuple(self._laws.broken.values())
         self._found.looks.update(self._laws.looks)
         self._found.under.update(self._laws.under)
