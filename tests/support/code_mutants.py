@@ -935,6 +935,13 @@ CODE_MUTANTS = (
             'if plain.get("code") != code_digest():', "if False:", "tests/simulated/test_search.py"),
     _mutant("breach_lost", "a schedule that broke a law is not kept", "teleop_drill/simulation/store.py",
             "        if new or found.broken:", "        if new:", "tests/simulated/test_search.py"),
+    _mutant("files_shared", "schedules that share a start write into the same file", "teleop_drill/simulation/seeds.py",
+            "                        _reopen(number, own / file.relative_to(place))", "                        pass",
+            "tests/simulated/test_seeds.py"),
+    _mutant("start_kept", "the random numbers of the start go on in the schedule", "teleop_drill/simulation/scheduler.py",
+            '            one.seed(f"{seed}/{name}")', "            pass", "tests/simulated/test_seeds.py"),
+    _mutant("block_lost", "the last setpoints of a block are not judged", "teleop_drill/simulation/laws.py",
+            "        if len(self._block) >= _BLOCK:", "        if False:", "tests/simulated/test_laws.py"),
 )  # fmt: skip
 """All of them."""
 

@@ -93,5 +93,6 @@ class Owner:
 
 
 def stamp_of(taken: Taken) -> int:
+    """Stamp of a message with a header [ns]."""
     seconds, nanoseconds = _STAMP.unpack_from(taken.data)
     return int(seconds) * 1_000_000_000 + int(nanoseconds)

@@ -143,9 +143,7 @@ class Starts:
                 self._waiting[key] = _Run(*key), place, self._ran()
         return apart(partial(self._go_on, key, seed, planned))
 
-    def _go_on(
-        self, key: tuple[int, Processes, float], seed: int, faults: Sequence[Fault]
-    ) -> tuple[Found, list[str]]:
+    def _go_on(self, key: tuple[int, Processes, float], seed: int, faults: Sequence[Fault]) -> tuple[Found, list[str]]:
         """Run a schedule in a copy of the process that started the session, with copies of its files."""
         run, place, ran = self._waiting[key]
         self._begin()
@@ -158,6 +156,11 @@ class Starts:
                         _reopen(number, own / file.relative_to(place))
             found = run.run(seed, faults)
         return found, sorted({*ran, *self._ran()})
+
+    def close(self) -> None:
+        """Remove the files of the waiting sessions."""
+        self._waiting.clear()
+        self._ends.close()
 
     def _begin(self) -> None:
         if self._branches is not None:
