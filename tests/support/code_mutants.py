@@ -45,6 +45,7 @@ _SPHERICAL_WRIST = "kinematics/closed_form/spherical_wrist.py"
 _PARALLEL_AXES = "kinematics/closed_form/parallel_axes.py"
 _CANDIDATES = "kinematics/closed_form/candidates.py"
 _SEEING = "hand/operators/observer.py"
+_SEEDS = "tests/simulated/test_seeds.py"
 CODE_MUTANTS = (
     _mutant("joints_overlap", "arrays over joints of a record begin at one place", "kernels/compiler/joint_records.py",
             "        begin = builder.add(begin, _bytes(builder, sizes))\n", "        pass\n", "joint_records"),
@@ -937,11 +938,13 @@ CODE_MUTANTS = (
             "        if new or found.broken:", "        if new:", "tests/simulated/test_search.py"),
     _mutant("files_shared", "schedules that share a start write into the same file", "teleop_drill/simulation/seeds.py",
             "                        _reopen(number, own / file.relative_to(place))", "                        pass",
-            "tests/simulated/test_seeds.py"),
-    _mutant("start_kept", "the random numbers of the start go on in the schedule", "teleop_drill/simulation/scheduler.py",
-            '            one.seed(f"{seed}/{name}")', "            pass", "tests/simulated/test_seeds.py"),
-    _mutant("block_lost", "the last setpoints of a block are not judged", "teleop_drill/simulation/laws.py",
-            "        if len(self._block) >= _BLOCK:", "        if False:", "tests/simulated/test_laws.py"),
+            f"{_SEEDS}::test_a_schedule_has_the_same_result_alone_and_after_the_start_of_another_one"),
+    _mutant("start_kept", "random numbers of the start go on in the schedule", "teleop_drill/simulation/scheduler.py",
+            '            one.seed(f"{seed}/{name}")', "            pass",
+            f"{_SEEDS}::test_a_schedule_has_the_same_result_alone_and_after_the_start_of_another_one"),
+    _mutant("block_alone", "steps between setpoints that are not judged together are not judged",
+            "teleop_drill/simulation/steps.py", "        if self._last is not None:", "        if False:",
+            "tests/unit/test_steps.py"),
 )  # fmt: skip
 """All of them."""
 
