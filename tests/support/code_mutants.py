@@ -15,7 +15,8 @@ import subprocess
 import sys
 import time
 
-from mutants import ROOT, Mutant, tree
+from broken_copies import Mutant
+from mutants import ROOT, tree
 
 UNIT = "tests/unit/test_"
 

@@ -14,8 +14,9 @@ import pytest
 from numpy.typing import ArrayLike
 from scipy import signal
 
+from broken_copies import MUTANTS
 from code_mutants import CODE_MUTANTS
-from mutants import MUTANTS, ROOT, changed
+from mutants import ROOT, changed
 from present import present
 from teleop_core.bags import reader, reports
 from teleop_core.bags.writer import BagWriter
