@@ -138,6 +138,13 @@ def searched(mutant: Mutant, most: int, seed: int) -> tuple[int, list[tuple[str,
     return count, [(law, text) for law, text in broken]
 
 
+def every() -> tuple[Mutant, ...]:
+    """Mutants of the drill, and those of a quick test."""
+    from code_mutants import CODE_MUTANTS
+
+    return (*MUTANTS, *CODE_MUTANTS)
+
+
 def search_all(mutants: Sequence[Mutant], most: int, seed: int) -> None:
     """Print a row of a table for each mutant: whether a search finds it, after how many schedules, by which law."""
     found = 0
@@ -148,6 +155,7 @@ def search_all(mutants: Sequence[Mutant], most: int, seed: int) -> None:
         except RuntimeError as error:  # a copy that starts no session is found at once
             count, broken = 0, [("starts", str(error).splitlines()[-1])]
         found += bool(broken)
+        print("".join(f"{mutant.name}: {law}: {text}\n" for law, text in broken), end="", file=sys.stderr, flush=True)
         law = ", ".join(f"`{law}`" for law, _ in broken) or "not found"
         print(f"| `{mutant.name}`: {mutant.text} | {mutant.past} | {count} | {law} |", flush=True)
     print(f"\n{found} of {len(mutants)} found, at most {most} schedules for each, seed {seed}", flush=True)
@@ -210,11 +218,12 @@ def main() -> int:
     parser.add_argument("--search", type=int, metavar="SCHEDULES", help="search for each, without its schedule or rows")
     parser.add_argument("--seed", type=int, default=0, help="of the search")
     asked = parser.parse_args()
-    chosen = [one for one in MUTANTS if one.name in asked.names or (not asked.names and (one.past or not asked.past))]
+    found = every() if asked.search is not None or asked.past else MUTANTS
+    chosen = [one for one in found if one.name in asked.names or (not asked.names and (one.past or not asked.past))]
     if unknown := set(asked.names) - {one.name for one in chosen}:
         parser.error(f"no mutant {', '.join(sorted(unknown))}; see --list")
     if asked.is_list:
-        for one in MUTANTS:
+        for one in chosen:
             laws = () if one.schedule is None else (f"law {one.schedule.law}",)
             print(f"{one.name:20} {one.text} ({', '.join((*one.rows, *laws))})")
         return 0

@@ -46,6 +46,14 @@ _FOUND_NS = 1_600_000_000
 """Time in which a recorder discovers all topics [ns]."""
 _ON_THE_WAY_NS = 300_000_000
 """Time in which a sent message is recorded [ns]."""
+_ANSWERED = 1.0
+"""Longest time until a command is answered [s]; only time in which the slave's process runs counts."""
+_PAUSED = 0.3
+"""Longest time until an arm pauses after an outage that is too long [s]; the same time must have passed since."""
+_OLDEST_NS = 6_000_000_000
+"""Age of a speed command that moves an arm no more [ns]: ``operation.oldest_command``, and a second."""
+_KEPT_NS = 250_000_000
+"""Longest time before its end from which a recorder that is killed loses messages [ns]."""
 _OLD = 1.0
 """Largest age of a command that an enabled arm may follow [s]."""
 _JOINING = 20
@@ -59,7 +67,8 @@ _SLOW_NS, _GIVEN_WAY_NS = 1_500_000, 4_500_000_000
 and a turn of the machine."""
 _FOLLOWING = int(MotionSource.FOLLOWING)
 LAWS = (
-    "speed", "tool speed", "motion", "told", "stop", "owner", "age", "way", "ends", "queues", "recorded", "recovery",
+    "speed", "tool speed", "motion", "told", "stop", "asked", "pause", "owner", "age", "way", "ends", "queues",
+    "recorded", "recovery",
 )  # fmt: skip
 """Names of all laws."""
 
@@ -128,8 +137,14 @@ class Laws:
         self._moved_at = 0.0
         self._press: tuple[int, bool] | None = None
         """Newest press that is not yet in force: number of the button, and whether the press was sent to the slave."""
-        self._obey_by, self._was_idle = 0.0, False
+        self._obey_by, self._was_idle, self._was_driven = 0.0, False, False
         self._presses = 0
+        self._due: dict[int, float] = {}
+        """Time from which each held button must keep the arm stopped [s]."""
+        self._asked: dict[str, float] = {}
+        """Time at which each command was last sent [s]."""
+        self._asks = 0
+        self._true_state, self._silent, self._stood, self._leave_by = -1, 0.0, 0.0, math.inf
         self._slow_ns: dict[Process, int] = {}  # time for which a process has had slow turns
         self._sent_ns: dict[bytes, list[int]] = {}  # times of sending, by publisher
         """Sending times of setpoints by the system's clock [ns], by publisher."""
@@ -175,6 +190,10 @@ class Laws:
         is_driven = cells is not None and not cells["is_busy"] and cells["motion"] != _FOLLOWING
         if wrong := self._owner.judge(process, stamp_ns, is_driven=is_driven):
             self._break("owner", wrong)
+        age_ns = self._scheduler.now_ns - self._stage.driven_ns
+        if is_driven and not self._was_driven and age_ns > _OLDEST_NS:
+            self._break("age", f"follows a speed command, although the last one is {1e-9 * age_ns:.1f} s old")
+        self._was_driven = is_driven
         self._stage.commanded_ns = self._owner.followed_ns
 
     def _judge_speed(self, step: Array, longest: float, way: float) -> None:
@@ -223,13 +242,19 @@ class Laws:
             self._process, stage.operation = process, {}
         if slave is not self._slave:
             self._slave, self._seen_state, self._press = slave, -1, None
+            self._due, self._true_state, self._silent, self._stood, self._leave_by = {}, -1, 0.0, 0.0, math.inf
             self._presses = len(stage.presses)
             for button in stage.held:  # this slave never received a message of the button
                 self._press, self._obey_by = (button, False), math.inf
         works = slave is not None and slave.stage is not None and slave.is_at_work
-        if works and process is not None and not process.is_stopped:
+        if works and process is not None and process.is_stopped:
+            self._stood += 1e-9 * _LOOK_NS
+        elif works and process is not None:
             self._worked += 1e-9 * _LOOK_NS
+            self._note_asked()
             self._judge_state(slave)
+            self._judge_change(slave)
+            self._judge_pause(slave)
             self._judge_stop(slave, process)
         self._judge_ends()
         self._judge_queues()
@@ -254,6 +279,55 @@ class Laws:
             was = "nothing" if told is None else State(int(told)).name
             self._break("told", f"is {State(state).name} for {in_force:.2f} s but has reported {was}")
 
+    def _note_asked(self) -> None:
+        """Note when commands were sent; a release of the stop overrides the buttons that are held."""
+        asked = self._stage.asked
+        self._asked.update(dict.fromkeys(asked[self._asks :], self._worked))
+        self._asks = len(asked)
+        held = self._stage.held if not self._was_asked(sometimes.RELEASE) else set()
+        self._due = {button: due for button, due in self._due.items() if button in held}
+
+    def _was_asked(self, *names: str) -> bool:
+        """Whether one of these commands may have been answered just now."""
+        since = self._worked - _ANSWERED - self._late()
+        return any(self._asked.get(name, -math.inf) >= since for name in names)
+
+    def _judge_change(self, slave: Any) -> None:
+        """Check that an arm becomes ENABLED, or leaves FAULT, by a command only, and never while a stop is held."""
+        before, after = self._true_state, int(slave.stage.state["state"])
+        self._true_state = after
+        if before in {-1, after}:
+            return
+        self._count("asked")
+        change = f"{State(before).name} became {State(after).name}"
+        if after == State.ENABLED and not self._was_asked("enable", "resume"):
+            self._break("asked", f"{change} without a command")
+        if before != State.FAULT:
+            return
+        if not self._was_asked("reset", "disable"):
+            self._break("asked", f"{change} without a command")
+        if any(due + self._late() < self._worked for due in self._due.values()):
+            self._break("stop", f"{change} while a stop button was held")
+
+    def _judge_pause(self, slave: Any) -> None:
+        """Check that an arm pauses whose commands, or whose own loop, stood still for too long."""
+        longest, state = slave.parameters.operation.longest_outage, slave.stage.state
+        self._count("pause")
+        if self._stood > longest + _PAUSED and state["state"] == State.ENABLED:
+            self._leave_by = self._worked + _PAUSED + self._late()
+        self._stood = 0.0
+        if state["state"] != State.ENABLED or self._was_asked("enable", "resume"):
+            self._silent, self._leave_by = 0.0, math.inf
+            return
+        silence = 1e-9 * (self._scheduler.now_ns - self._owner.followed_ns)
+        is_silent = silence > longest + _PAUSED and state["is_stream"] and not state["is_busy"]
+        is_silent = is_silent and state["motion"] == _FOLLOWING
+        self._silent = self._silent + 1e-9 * _LOOK_NS if is_silent else 0.0
+        if self._silent > _PAUSED + self._late():
+            self._break("pause", f"is ENABLED after {silence:.1f} s without a command")
+        if self._worked > self._leave_by:
+            self._break("pause", "is ENABLED after its loop stood still")
+
     def _judge_stop(self, slave: Any, process: Process) -> None:
         """Check that a pressed stop is in force in time, and never lost.
 
@@ -274,6 +348,7 @@ class Laws:
         self._was_idle |= operation["state"] == State.DISABLED
         if math.isinf(self._obey_by) and (times := stage.found(button, process)) and times[1] <= now_ns:
             self._obey_by = self._worked + (_OBEY if is_sent else _DOUBT)
+            self._due[button] = self._obey_by
         is_over = not is_sent and self._was_idle and button not in stage.held
         if is_over or operation["is_stopped"] or operation["is_pressed"]:
             self._press = None
@@ -363,6 +438,21 @@ class Laws:
         lost = int(told.get(f"lost.{SLAVE_SETPOINT_JS.name}", 0))
         if sent - kept > lost + 1:
             self._break("recorded", f"{sent} setpoints were sent, {kept} recorded, {lost} counted")
+
+    def judge_killed(self, path: Path, killed_ns: int) -> None:
+        """Check that a killed recorder, whose disk and processor were sound, lost only the messages before its end.
+
+        Args:
+            path: Its recording.
+            killed_ns: Time at which it was killed [ns].
+        """
+        self._count("recorded")
+        until_ns = killed_ns + self._stage.machine.clock.ahead_ns(killed_ns) - _KEPT_NS
+        kept_ns = Bag(recover(path)[0]).read(SLAVE_SETPOINT_JS).log_ns
+        sent_ns = np.concatenate([np.array(times) for times in self._sent_ns.values()])
+        lost = int(np.sum((sent_ns > kept_ns[-1]) & (sent_ns < until_ns)))
+        if lost > 1:
+            self._break("recorded", f"a killed recorder lost {lost} setpoints that were sent long before its end")
 
     def judge_recovery(self, seconds: float | None, bound: float) -> None:
         """Check that after the recovery the arm follows again, or reports the reason why it does not.

@@ -54,6 +54,8 @@ class Owner:
         now_ns = self._bus.scheduler.now_ns
         if process is not self._process:
             self._forget(process)
+        if not stamp_ns:
+            return "a setpoint has the stamp 0, which clients take for none"
         begins, self._is_driven = is_driven and not self._is_driven, is_driven
         silence_ns = now_ns - self.followed_ns
         if begins and self._in_row >= _STREAM and silence_ns < self._timeout_ns:

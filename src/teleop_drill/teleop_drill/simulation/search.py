@@ -217,13 +217,16 @@ def search(store: Store, seed: int, seconds: float, cores: int | None = None) ->
         found, branches = waiting.popleft().result()
         return found, store.add(found, branches)
 
-    with workers(cores, _warm) as pool:
-        while time.monotonic() < end:
-            if len(waiting) >= _AHEAD:
+    try:
+        with workers(cores, _warm) as pool:
+            while time.monotonic() < end:
+                if len(waiting) >= _AHEAD:
+                    yield take()
+                waiting.append(pool.submit(_run_apart, chosen.choose()))
+            while waiting:
                 yield take()
-            waiting.append(pool.submit(_run_apart, chosen.choose()))
-        while waiting:
-            yield take()
+    finally:
+        store.save()
 
 
 _branches = Branches()
