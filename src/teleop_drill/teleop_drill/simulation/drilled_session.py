@@ -230,6 +230,11 @@ class DrilledSession:
             self._publishers[name] = self._node.create_publisher(kind, f"/{name}", Qos(depth=1))
         return self._publishers[name]
 
+    @property
+    def senders(self) -> set[bytes]:
+        """Publishers of the drill, apart from its buttons and speeds."""
+        return {one.sender for one in self._publishers.values()}
+
     def every(self, period: float, work: Callable[[], None]) -> Callable[[], None]:
         """Repeat an action with a period [s]; returns the function that ends it."""
         timer = self._node.create_timer(period, work)

@@ -22,6 +22,7 @@ from teleop_core.slave.commands import CommandStatus
 from teleop_core.slave.velocity import MotionSource
 from teleop_drill.drill.numbers import Numbers
 from teleop_drill.simulation import sometimes
+from teleop_drill.simulation.changes import Changes
 from teleop_drill.simulation.drilled_session import DrilledSession
 from teleop_drill.simulation.machine import Process
 from teleop_drill.simulation.owner import Owner
@@ -46,10 +47,13 @@ _FOUND_NS = 1_600_000_000
 """Time in which a recorder discovers all topics [ns]."""
 _ON_THE_WAY_NS = 300_000_000
 """Time in which a sent message is recorded [ns]."""
-_ANSWERED = 1.0
-"""Longest time until a command is answered [s]; only time in which the slave's process runs counts."""
-_PAUSED = 0.3
-"""Longest time until an arm pauses after an outage that is too long [s]; the same time must have passed since."""
+_SOON = 0.06
+"""Delay of a machine that is not busy [s]."""
+_ENGAGING_NS = 200_000_000
+"""Time in which an arm that begins to follow moves no faster than the hand [ns]."""
+_REST = 0.25
+"""Longest time until an arm without a new speed command is at rest, in addition to the command timeout and braking [s].
+"""
 _OLDEST_NS = 6_000_000_000
 """Age of a speed command that moves an arm no more [ns]: ``operation.oldest_command``, and a second."""
 _KEPT_NS = 250_000_000
@@ -67,8 +71,8 @@ _SLOW_NS, _GIVEN_WAY_NS = 1_500_000, 4_500_000_000
 and a turn of the machine."""
 _FOLLOWING = int(MotionSource.FOLLOWING)
 LAWS = (
-    "speed", "tool speed", "motion", "told", "stop", "asked", "pause", "owner", "age", "way", "ends", "queues",
-    "recorded", "recovery",
+    "speed", "tool speed", "motion", "told", "stop", "asked", "pause", "engage", "owner", "age", "way", "ends",
+    "queues", "recorded", "recovery",
 )  # fmt: skip
 """Names of all laws."""
 
@@ -139,12 +143,11 @@ class Laws:
         """Newest press that is not yet in force: number of the button, and whether the press was sent to the slave."""
         self._obey_by, self._was_idle, self._was_driven = 0.0, False, False
         self._presses = 0
-        self._due: dict[int, float] = {}
-        """Time from which each held button must keep the arm stopped [s]."""
-        self._asked: dict[str, float] = {}
-        """Time at which each command was last sent [s]."""
-        self._asks = 0
-        self._true_state, self._silent, self._stood, self._leave_by = -1, 0.0, 0.0, math.inf
+        self._drive_ns, self._driven_at, self._followed_ns, self._stamp_ns = 0, 0.0, 0, 0
+        self._leader = b""
+        self._engaged: tuple[int, list[float]] | None = None
+        """When the arm began to follow [ns], and where the tip was then."""
+        self._changes = Changes(stage, numbers, self._count, self._break)
         self._slow_ns: dict[Process, int] = {}  # time for which a process has had slow turns
         self._sent_ns: dict[bytes, list[int]] = {}  # times of sending, by publisher
         """Sending times of setpoints by the system's clock [ns], by publisher."""
@@ -172,6 +175,7 @@ class Laws:
         q = found[1][: self._stage.robot.n]
         tip = self._stage.robot.fk(q)[:3, 3].tolist()
         self._judge_owner(slave, process, found[0])
+        self._judge_engage(tip)
         if self._last is not None and self._last[2] is process:
             step = np.abs(q - self._last[0])
             longest = float(step.max())
@@ -195,6 +199,23 @@ class Laws:
             self._break("age", f"follows a speed command, although the last one is {1e-9 * age_ns:.1f} s old")
         self._was_driven = is_driven
         self._stage.commanded_ns = self._owner.followed_ns
+
+    def _judge_engage(self, tip: list[float]) -> None:
+        """Check that an arm that begins to follow does not run to where the hand is, if nothing is late."""
+        before_ns, self._followed_ns = self._followed_ns, self._owner.followed_ns
+        if self._followed_ns - before_ns > 1e9 * _OLD:
+            is_new = self._worked - self._since < 1.5 * _OLD  # otherwise the hand may have led on behind a bad line
+            is_quiet = not self._stage.bus.lines and self._late() < _SOON
+            is_hand = self._owner.leader not in self._stage.senders
+            self._engaged = (self._followed_ns, tip) if is_new and is_quiet and is_hand else None
+        if self._engaged is None:
+            return
+        self._count("engage")
+        way = math.dist(tip, self._engaged[1])
+        if self._scheduler.now_ns - self._engaged[0] > _ENGAGING_NS:
+            self._engaged = None
+        elif way > 1.5e-9 * _ENGAGING_NS * self._numbers.tip_speed:
+            self._break("engage", f"the tip went {1e3 * way:.0f} mm as it began to follow, at most as fast as the hand")
 
     def _judge_speed(self, step: Array, longest: float, way: float) -> None:
         self._count("tool speed")
@@ -221,9 +242,15 @@ class Laws:
         if stamp_ns == NO_COMMAND_NS or not moves:
             self._old = 0
             return
+        leader, before_ns = self._owner.leader, self._stamp_ns
+        is_back = leader == self._leader and stamp_ns < before_ns
+        self._leader, self._stamp_ns = leader, stamp_ns
         if self._scheduler.now_ns - self._stepped_ns < _AFTER_STEP_NS:
             return
         self._count("age")
+        if is_back:
+            older = 1e-6 * (before_ns - stamp_ns)
+            self._break("age", f"follows a command that is {older:.0f} ms older than the one before")
         master: Any = self._stage.session.node("haptic_master")
         # A process continues to use the clock with which it was started for its stamps.
         epoch_ns = getattr(master, "epoch_ns", offset_ns)
@@ -242,19 +269,18 @@ class Laws:
             self._process, stage.operation = process, {}
         if slave is not self._slave:
             self._slave, self._seen_state, self._press = slave, -1, None
-            self._due, self._true_state, self._silent, self._stood, self._leave_by = {}, -1, 0.0, 0.0, math.inf
+            self._changes.begin()
             self._presses = len(stage.presses)
             for button in stage.held:  # this slave never received a message of the button
                 self._press, self._obey_by = (button, False), math.inf
         works = slave is not None and slave.stage is not None and slave.is_at_work
         if works and process is not None and process.is_stopped:
-            self._stood += 1e-9 * _LOOK_NS
+            self._changes.stand(1e-9 * _LOOK_NS)
         elif works and process is not None:
             self._worked += 1e-9 * _LOOK_NS
-            self._note_asked()
+            silence = 1e-9 * (self._scheduler.now_ns - self._owner.followed_ns)
+            self._changes.judge(slave, self._worked, self._late(), silence)
             self._judge_state(slave)
-            self._judge_change(slave)
-            self._judge_pause(slave)
             self._judge_stop(slave, process)
         self._judge_ends()
         self._judge_queues()
@@ -263,7 +289,7 @@ class Laws:
     def _judge_state(self, slave: Any) -> None:
         """Check that an arm that must not move is at rest, and that its state is reported in time."""
         self._stage.sometimes[f"a command is {CommandStatus(int(slave.row['command_status'])).name}"] += 1
-        state = int(slave.stage.operation["state"])
+        state = int(slave.stage.state["state"])
         if state != self._seen_state:
             self._seen_state, self._since = state, self._worked
         in_force = self._worked - self._since
@@ -271,62 +297,18 @@ class Laws:
         moves = self._worked - self._moved_at < 1e-9 * _LOOK_NS
         if moves and state != State.ENABLED and in_force > self._braking + 0.3:
             self._break("motion", f"moves {in_force:.2f} s after it became {State(state).name}")
-        if state != State.ENABLED and slave.stage.operation["is_busy"]:
+        if state != State.ENABLED and slave.stage.state["is_busy"]:
             self._break("motion", f"has an unfinished move while it is {State(state).name}")
+        if self._stage.driven_ns != self._drive_ns:
+            self._drive_ns, self._driven_at = self._stage.driven_ns, self._worked
+        undriven = self._worked - self._driven_at - self._numbers.command_timeout - self._braking - self._late()
+        if moves and self._was_driven and undriven > _REST:
+            self._break("motion", f"moves {self._worked - self._driven_at:.2f} s after the last speed command")
         self._count("told")
         told = self._stage.operation.get("state")
         if in_force > _TELL and told != state:
             was = "nothing" if told is None else State(int(told)).name
             self._break("told", f"is {State(state).name} for {in_force:.2f} s but has reported {was}")
-
-    def _note_asked(self) -> None:
-        """Note when commands were sent; a release of the stop overrides the buttons that are held."""
-        asked = self._stage.asked
-        self._asked.update(dict.fromkeys(asked[self._asks :], self._worked))
-        self._asks = len(asked)
-        held = self._stage.held if not self._was_asked(sometimes.RELEASE) else set()
-        self._due = {button: due for button, due in self._due.items() if button in held}
-
-    def _was_asked(self, *names: str) -> bool:
-        """Whether one of these commands may have been answered just now."""
-        since = self._worked - _ANSWERED - self._late()
-        return any(self._asked.get(name, -math.inf) >= since for name in names)
-
-    def _judge_change(self, slave: Any) -> None:
-        """Check that an arm becomes ENABLED, or leaves FAULT, by a command only, and never while a stop is held."""
-        before, after = self._true_state, int(slave.stage.state["state"])
-        self._true_state = after
-        if before in {-1, after}:
-            return
-        self._count("asked")
-        change = f"{State(before).name} became {State(after).name}"
-        if after == State.ENABLED and not self._was_asked("enable", "resume"):
-            self._break("asked", f"{change} without a command")
-        if before != State.FAULT:
-            return
-        if not self._was_asked("reset", "disable"):
-            self._break("asked", f"{change} without a command")
-        if any(due + self._late() < self._worked for due in self._due.values()):
-            self._break("stop", f"{change} while a stop button was held")
-
-    def _judge_pause(self, slave: Any) -> None:
-        """Check that an arm pauses whose commands, or whose own loop, stood still for too long."""
-        longest, state = slave.parameters.operation.longest_outage, slave.stage.state
-        self._count("pause")
-        if self._stood > longest + _PAUSED and state["state"] == State.ENABLED:
-            self._leave_by = self._worked + _PAUSED + self._late()
-        self._stood = 0.0
-        if state["state"] != State.ENABLED or self._was_asked("enable", "resume"):
-            self._silent, self._leave_by = 0.0, math.inf
-            return
-        silence = 1e-9 * (self._scheduler.now_ns - self._owner.followed_ns)
-        is_silent = silence > longest + _PAUSED and state["is_stream"] and not state["is_busy"]
-        is_silent = is_silent and state["motion"] == _FOLLOWING
-        self._silent = self._silent + 1e-9 * _LOOK_NS if is_silent else 0.0
-        if self._silent > _PAUSED + self._late():
-            self._break("pause", f"is ENABLED after {silence:.1f} s without a command")
-        if self._worked > self._leave_by:
-            self._break("pause", "is ENABLED after its loop stood still")
 
     def _judge_stop(self, slave: Any, process: Process) -> None:
         """Check that a pressed stop is in force in time, and never lost.
@@ -348,7 +330,7 @@ class Laws:
         self._was_idle |= operation["state"] == State.DISABLED
         if math.isinf(self._obey_by) and (times := stage.found(button, process)) and times[1] <= now_ns:
             self._obey_by = self._worked + (_OBEY if is_sent else _DOUBT)
-            self._due[button] = self._obey_by
+            self._changes.hold(button, self._obey_by)
         is_over = not is_sent and self._was_idle and button not in stage.held
         if is_over or operation["is_stopped"] or operation["is_pressed"]:
             self._press = None
