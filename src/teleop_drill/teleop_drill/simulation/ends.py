@@ -1,6 +1,7 @@
 """Ends: writers and readers of simulated topics, and services."""
 
 import ctypes
+import struct
 from bisect import insort
 from collections import deque
 from collections.abc import Callable
@@ -18,6 +19,8 @@ from teleop_drill.simulation.scheduler import Scheduler, Strand
 _PUBLISH_NS = 12_000  # time that the middleware needs to publish a message, measured with rclpy [ns]
 _OK, _EMPTY = 0, 401  # RCL_RET_OK, RCL_RET_SUBSCRIPTION_TAKE_FAILED
 _ROOM = 1024  # initial size of the buffer of a taken message [bytes]
+_Two = ctypes.c_int64 * 2
+_MESSAGE, _INFO = struct.Struct("2q"), struct.Struct("7q")
 _halves = cache(halves)
 
 
@@ -70,10 +73,13 @@ class Writer:
         self._bus, self.process, self.node, self.topic, self.qos = bus, process, node, topic, qos
         self.ros_type = _name_of(kind)
         self.sender, self.born_ns, self._clock = bus.next_gid(), bus.scheduler.now_ns, process.machine.clock
+        self._now = bus.scheduler.now
         self.number, self.is_open, self.is_active = 0, True, True
         self.links: list[Match] = []
         self.history: deque[Taken] = deque(maxlen=None if qos.keeps_all else qos.depth)
         self._reached = Reached(bus.scheduler.now_at, self._send_at, bus.scheduler.keep)
+        self._place, self._view = (0, 0), memoryview(b"")
+        """Address and size of the last message that a kernel sent, and its memory."""
         self.note_links()
 
     @property
@@ -94,8 +100,10 @@ class Writer:
         self._reached.since(min(times, default=NEVER_NS))
 
     def _send_at(self, message_at: int, _: int) -> int:
-        at, size = (ctypes.c_int64 * 2).from_address(message_at)
-        self.send(ctypes.string_at(at, size))
+        place = at, size = tuple(_Two.from_address(message_at))
+        if place != self._place:
+            self._place, self._view = place, memoryview((ctypes.c_char * size).from_address(at))
+        self.send(bytes(self._view))
         return 0
 
     def publish(self, message: Any) -> None:
@@ -106,8 +114,8 @@ class Writer:
         """Send bytes, if the node is active."""
         if not (self.is_active and self.is_open):
             return
-        bus = self._bus
-        bus.scheduler.now_ns = now_ns = bus.scheduler.now_ns + _PUBLISH_NS
+        bus, now = self._bus, self._now
+        now[0] = now_ns = now[0] + _PUBLISH_NS
         self.number += 1
         # The middleware reads the machine's clock; the clock that the drill steps is used only by Python code.
         taken = Taken(data, self.sender, self.number, now_ns + self._clock.ahead_ns(now_ns), 0)
@@ -143,7 +151,7 @@ class Reader:
     def __init__(self, bus: _Carrier, process: Process, kind: Any, topic: str, qos: Qos, node: str) -> None:
         self._bus, self.process, self.type, self.topic, self.qos = bus, process, kind, topic, qos
         self.node, self.ros_type, self.sender = node, _name_of(kind), bus.next_gid()
-        self.lost, self.born_ns, self.is_open = 0, bus.scheduler.now_ns, True
+        self.lost, self.born_ns, self.is_open, self._now = 0, bus.scheduler.now_ns, True, bus.scheduler.now
         self.coming: deque[tuple[int, int, Taken]] = deque()
         self._ready: deque[tuple[int, int, Taken]] = deque(maxlen=None if qos.keeps_all else qos.depth)
         self.waiting: Strand | None = None
@@ -153,6 +161,7 @@ class Reader:
         self._message, self._info = (ctypes.c_int64 * 2)(), (ctypes.c_int64 * 7)()
         """``rcutils_uint8_array_t`` and ``rmw_message_info_t`` of the last taken message, for kernels."""
         self._buffer, self._found = ctypes.create_string_buffer(_ROOM), (0, Taken(b"", b"", 0, 0, 0))
+        self._at, self._room = ctypes.addressof(self._buffer), memoryview(self._buffer).cast("B")
 
     @property
     def places(self) -> tuple[int, int, int] | None:
@@ -172,12 +181,12 @@ class Reader:
             return _EMPTY
         came_ns, (data, sender, number, sent_ns, _) = found
         self._found = found
-        if len(data) > len(self._buffer):
-            self._buffer = ctypes.create_string_buffer(len(data))
-        at = ctypes.addressof(self._buffer)
-        ctypes.memmove(at, data, len(data))
-        self._message[:] = [at, len(data)]
-        self._info[:] = [sent_ns, came_ns, number, 0, 0, *_halves(sender)]
+        if (size := len(data)) > len(self._buffer):
+            self._buffer = ctypes.create_string_buffer(size)
+            self._at, self._room = ctypes.addressof(self._buffer), memoryview(self._buffer).cast("B")
+        self._room[:size] = data
+        _MESSAGE.pack_into(self._message, 0, self._at, size)
+        _INFO.pack_into(self._info, 0, sent_ns, came_ns, number, 0, 0, *_halves(sender))
         return _OK
 
     def _note(self) -> None:
@@ -194,8 +203,8 @@ class Reader:
 
     def _pop(self) -> tuple[int, Taken] | None:
         """Remove the oldest waiting message; its time of arrival by the machine's clock [ns], and the message."""
-        scheduler = self._bus.scheduler
-        scheduler.now_ns = now_ns = scheduler.now_ns + TAKE_NS
+        now = self._now
+        now[0] = now_ns = now[0] + TAKE_NS
         coming, ready = self.coming, self._ready
         while coming and coming[0][0] <= now_ns:
             ready.append(coming.popleft())

@@ -25,7 +25,7 @@ from teleop_drill.simulation import sometimes
 from teleop_drill.simulation.changes import Changes
 from teleop_drill.simulation.drilled_session import DrilledSession
 from teleop_drill.simulation.machine import Process
-from teleop_drill.simulation.owner import Owner
+from teleop_drill.simulation.owner import Owner, stamp_of
 
 _LOOK_NS = 5_000_000
 _BAD = ("error", "fatal")
@@ -64,6 +64,8 @@ _JOINING = 20
 """Number of setpoints by which a newly enabled slave moves its setpoint to the arm without a command."""
 _AFTER_STEP_NS = 5_000_000_000
 """Time after a step of the clock in which stamps from before the step may arrive [ns]."""
+_BLOCK = 64
+"""Number of setpoints whose speeds are judged together."""
 _QUEUES = 2500
 """Largest number of messages that may wait in any queue; it is somewhat more than the recorder's longest queue."""
 _SLOW_NS, _GIVEN_WAY_NS = 1_500_000, 4_500_000_000
@@ -124,10 +126,16 @@ class Laws:
         self.under: Counter[tuple[str, str, str]] = Counter()
         self.lost_recorders: set[Process] = set()
         self.begin_ns = self._scheduler.now_ns
-        self._last: tuple[Array, list[float], Process | None] | None = None
-        """Newest setpoint: joints, position of the tip, and process of the slave."""
+        self._last: tuple[Array, Array] | None = None
+        """Newest judged setpoint: joints, and position of the tip."""
+        self._block: list[bytes] = []
+        """Setpoints whose speeds are not yet judged."""
+        self._block_of: Process | None = None
+        first = 4 + 8 * int(self._form.places[0])
+        self._joints, self._at = slice(first, first + 8 * stage.robot.n), b""
+        """Place of the joints in a message, and the newest joints."""
+        self._status, self._has_moved = memoryview(b""), False
         self._longest_step = numbers.speed_limit * (1.0 + _SLACK) * DT
-        self._least_step = float(np.min(self._longest_step))  # a shorter step breaks no limit
         self._braking = float(np.max(numbers.speed_limit / numbers.braking))
         self._slave: Any = None
         self._led: Any = None  # stage whose state the cells are
@@ -158,38 +166,59 @@ class Laws:
         at = 1e-9 * (self._scheduler.now_ns - self.begin_ns)
         self.broken.setdefault(law, Broken(law, at, text))
 
-    def _count(self, law: str) -> None:
-        self.looks[law] += 1
+    def _count(self, law: str, number: int = 1) -> None:
+        self.looks[law] += number
         for kind in self.in_force:
-            self.under[kind, self._stage.state, law] += 1
+            self.under[kind, self._stage.state, law] += number
 
     # -- at every setpoint -----------------------------------------------------------------------
 
     def _judge_setpoint(self, taken: Taken) -> None:
+        """Judge at once what needs the present state; the speeds are judged later, several setpoints at a time."""
         self._sent_ns.setdefault(taken.sender, []).append(self._stage.platform.time_ns())
-        found = self._form.decode_one(taken.data)
         slave, process = self._stage.session.node("slave"), self._stage.session.process_of("slave")
-        if found is None or slave is None:
-            self._last = None
+        data = taken.data
+        if slave is None or process is not self._block_of or len(data) < self._form.size:
+            self._judge_block()
+            self._last, self._block_of, self._at = None, process, b""
+        if slave is None or len(data) < self._form.size:
             return
-        q = found[1][: self._stage.robot.n]
-        tip = self._stage.robot.fk(q)[:3, 3].tolist()
-        self._judge_owner(slave, process, found[0])
-        self._judge_engage(tip)
-        if self._last is not None and self._last[2] is process:
-            step = np.abs(q - self._last[0])
-            longest = float(step.max())
-            self._judge_speed(step, longest, math.dist(tip, self._last[1]))
-            if slave.row["command_status"] == CommandStatus.FRESH:  # otherwise the slave may still brake
-                self._judge_age(found[0], longest > 0.0)
-        self._last, self._stage.setpoint = (q, tip, process), q
-
-    def _judge_owner(self, slave: Any, process: Process | None, stamp_ns: int) -> None:
-        """Check that only one sender commands the arm at a time."""
-        self._count("owner")
+        self._block.append(data[: self._form.size])
+        if len(self._block) >= _BLOCK:
+            self._judge_block()
+        stamp_ns = stamp_of(taken)
         if slave.stage is not self._led:
             self._led = slave.stage
             self._cells = None if self._led is None else Cells(self._led.state)
+            self._status = slave.row.number("command_status")
+        self._judge_owner(process, stamp_ns)
+        self._judge_engage(data)
+        before, self._at = self._at, data[self._joints]
+        self._has_moved |= before != self._at
+        if before and self._status[0] == CommandStatus.FRESH:  # otherwise the slave may still brake
+            self._judge_age(stamp_ns, before != self._at)
+
+    def _judge_block(self) -> None:
+        """Judge the speeds of the setpoints since the last call, all of one process."""
+        if not self._block:
+            return
+        rows = np.frombuffer(b"".join(self._block), np.uint8).reshape(len(self._block), -1)
+        self._block.clear()
+        if not self._form.matches(rows):
+            self._last = None
+            return
+        q = self._form.decode(rows)[1][:, : self._stage.robot.n]
+        tips = self._stage.robot.fk(q)[:, :3, 3]
+        self._stage.setpoint = q[-1]
+        if self._last is not None:
+            q, tips = np.vstack((self._last[0], q)), np.vstack((self._last[1], tips))
+        self._last = q[-1], tips[-1]
+        if len(q) > 1:
+            self._judge_speed(np.abs(np.diff(q, axis=0)), np.linalg.norm(np.diff(tips, axis=0), axis=1))
+
+    def _judge_owner(self, process: Process | None, stamp_ns: int) -> None:
+        """Check that only one sender commands the arm at a time."""
+        self._count("owner")
         cells = self._cells
         is_driven = cells is not None and not cells["is_busy"] and cells["motion"] != _FOLLOWING
         if wrong := self._owner.judge(process, stamp_ns, is_driven=is_driven):
@@ -200,38 +229,49 @@ class Laws:
         self._was_driven = is_driven
         self._stage.commanded_ns = self._owner.followed_ns
 
-    def _judge_engage(self, tip: list[float]) -> None:
+    def _judge_engage(self, data: bytes) -> None:
         """Check that an arm that begins to follow does not run to where the hand is, if nothing is late."""
-        before_ns, self._followed_ns = self._followed_ns, self._owner.followed_ns
+        now_ns, before_ns, self._followed_ns = self._scheduler.now_ns, self._followed_ns, self._owner.followed_ns
         if self._followed_ns - before_ns > 1e9 * _OLD:
             is_new = self._worked - self._since < 1.5 * _OLD  # otherwise the hand may have led on behind a bad line
-            is_quiet = not self._stage.bus.lines and self._late() < _SOON
             is_hand = self._owner.leader not in self._stage.senders
-            self._engaged = (self._followed_ns, tip) if is_new and is_quiet and is_hand else None
-        if self._engaged is None:
+            self._engaged = (now_ns, self._tip(data)) if is_new and is_hand and self._is_quiet() else None
+        if self._engaged is None or now_ns - self._engaged[0] < _ENGAGING_NS:
             return
         self._count("engage")
-        way = math.dist(tip, self._engaged[1])
-        if self._scheduler.now_ns - self._engaged[0] > _ENGAGING_NS:
-            self._engaged = None
-        elif way > 1.5e-9 * _ENGAGING_NS * self._numbers.tip_speed:
-            self._break("engage", f"the tip went {1e3 * way:.0f} mm as it began to follow, at most as fast as the hand")
+        (since_ns, place), self._engaged = self._engaged, None
+        way = math.dist(self._tip(data), place)
+        if self._is_quiet() and way > 1.5e-9 * (now_ns - since_ns) * self._numbers.tip_speed:
+            self._break("engage", f"the tip went {1e3 * way:.0f} mm as it began to follow, faster than the hand")
 
-    def _judge_speed(self, step: Array, longest: float, way: float) -> None:
-        self._count("tool speed")
-        most = self._numbers.tool_speed
+    def _tip(self, data: bytes) -> list[float]:
+        """Place of the tip in a setpoint [m]; not a number for bytes that are none."""
+        found = self._form.decode_one(data)
+        if found is None:
+            return [math.nan] * 3
+        place: list[float] = self._stage.robot.fk(found[1][: self._stage.robot.n])[:3, 3].tolist()
+        return place
+
+    def _is_quiet(self) -> bool:
+        return not self._stage.bus.lines and self._late() < _SOON
+
+    def _judge_speed(self, steps: Array, ways: Array) -> None:
+        """Check steps of the joints (N, n) and of the tip (N,), each in one tick."""
+        self._count("tool speed", len(ways))
+        way, most = float(ways.max()), self._numbers.tool_speed
         if way > most * DT * (1.0 + _CURVED):
             self._break("tool speed", f"the setpoint of the tip moved at {way / DT:.3g} m/s, at most {most:.3g}")
-        self._count("speed")
-        if not longest <= self._least_step and (step > self._longest_step).any():
-            speed = step / DT
+        self._count("speed", len(steps))
+        longest = steps.max(axis=0)
+        if not (longest <= self._longest_step).all():
+            speed = longest / DT
             joint = int(np.argmax(speed / self._numbers.speed_limit))
             self._break(
                 "speed",
                 f"the setpoint of joint {joint + 1} moved at {speed[joint]:.3g}, beyond its drive's "
                 f"{self._numbers.speed_limit[joint]:.3g}",
             )
-        if longest > _SLACK * DT:
+        if longest.max() > _SLACK * DT:
             self._moved_at = self._worked
 
     def _judge_age(self, stamp_ns: int, moves: bool) -> None:
@@ -255,7 +295,7 @@ class Laws:
         # A process continues to use the clock with which it was started for its stamps.
         epoch_ns = getattr(master, "epoch_ns", offset_ns)
         age = 1e-9 * (self._scheduler.now_ns + epoch_ns - stamp_ns)
-        self._old = self._old + 1 if age > _OLD + self._late() else 0
+        self._old = self._old + 1 if age > _OLD and age > _OLD + self._late() else 0
         if self._old > _JOINING:
             self._break("age", f"follows a command that is {age:.2f} s old")
 
@@ -294,15 +334,19 @@ class Laws:
             self._seen_state, self._since = state, self._worked
         in_force = self._worked - self._since
         self._count("motion")
+        if self._stage.driven_ns != self._drive_ns:
+            self._drive_ns, self._driven_at = self._stage.driven_ns, self._worked
+        undriven = self._worked - self._driven_at - self._numbers.command_timeout - self._braking - self._late()
+        is_undriven = self._was_driven and undriven > _REST
+        if self._has_moved and (is_undriven or (state != State.ENABLED and in_force > self._braking + 0.2)):
+            self._has_moved = False
+            self._judge_block()
         moves = self._worked - self._moved_at < 1e-9 * _LOOK_NS
         if moves and state != State.ENABLED and in_force > self._braking + 0.3:
             self._break("motion", f"moves {in_force:.2f} s after it became {State(state).name}")
         if state != State.ENABLED and slave.stage.state["is_busy"]:
             self._break("motion", f"has an unfinished move while it is {State(state).name}")
-        if self._stage.driven_ns != self._drive_ns:
-            self._drive_ns, self._driven_at = self._stage.driven_ns, self._worked
-        undriven = self._worked - self._driven_at - self._numbers.command_timeout - self._braking - self._late()
-        if moves and self._was_driven and undriven > _REST:
+        if moves and is_undriven:
             self._break("motion", f"moves {self._worked - self._driven_at:.2f} s after the last speed command")
         self._count("told")
         told = self._stage.operation.get("state")
@@ -387,6 +431,10 @@ class Laws:
                 self._break("queues", f"{count} calls wait in {process.name}")
 
     # -- at the end ------------------------------------------------------------------------------
+
+    def finish(self) -> None:
+        """Judge the last setpoints."""
+        self._judge_block()
 
     def judge_recording(self, path: Path, told: Mapping[str, str]) -> None:
         """Check that all sent messages (all saved ones if the disk failed) are recorded or counted as lost.

@@ -88,7 +88,7 @@ class Owner:
 
     def _note_sent(self, taken: Taken) -> None:
         if len(taken.data) >= _STAMP.size:
-            self._senders.setdefault(_stamp_of(taken), taken.sender)
+            self._senders.setdefault(stamp_of(taken), taken.sender)
 
     def _note_taken(self, reader: Reader, taken: Taken) -> None:
         if reader.node != _SLAVE or len(taken.data) < _STAMP.size:
@@ -96,9 +96,10 @@ class Owner:
         now_ns = self._bus.scheduler.now_ns
         self._heard_ns[taken.sender] = now_ns
         if self._leader and taken.sender != self._leader:
-            self._silences[_stamp_of(taken)] = now_ns - self._heard_ns.get(self._leader, 0)
+            self._silences[stamp_of(taken)] = now_ns - self._heard_ns.get(self._leader, 0)
 
 
-def _stamp_of(taken: Taken) -> int:
+def stamp_of(taken: Taken) -> int:
+    """Stamp of a message with a header [ns]."""
     seconds, nanoseconds = _STAMP.unpack_from(taken.data)
     return int(seconds) * 1_000_000_000 + int(nanoseconds)

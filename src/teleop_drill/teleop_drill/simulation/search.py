@@ -6,18 +6,17 @@ from collections import Counter, deque
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Future
 from dataclasses import replace
-from functools import partial
 from random import Random
 
-from teleop_core.base.workers import apart, workers
+from teleop_core.base.workers import workers
 from teleop_core.graph.operation import State
 from teleop_core.nodes.crews import Processes
 from teleop_core.slave.operation.states import COMMANDS
 from teleop_drill.simulation import sometimes
 from teleop_drill.simulation.branches import Branches
 from teleop_drill.simulation.planned import Schedule
-from teleop_drill.simulation.schedules import BEGIN, END, KINDS, OF_PROCESS, Fault, commanded
-from teleop_drill.simulation.seeds import PROCESSES, Found, warm
+from teleop_drill.simulation.schedules import BEGIN, KINDS, OF_PROCESS, Fault, commanded
+from teleop_drill.simulation.seeds import PROCESSES, Found, Starts, warm
 from teleop_drill.simulation.store import Store
 
 _MOST = 30
@@ -27,6 +26,8 @@ _FRESH = 0.4
 _AHEAD = 4
 """A schedule is chosen when all but this many before it are known, so that the number of cores changes nothing."""
 _BREAKS = 0.0005
+_END = 5.0
+"""Latest time of a drawn fault [s]: many faults at once need less time than one after the other."""
 _LEADS = {
     State.DISABLED.name: ("reset", "disable"),
     State.ENABLED.name: ("reset", "enable", "resume"),
@@ -96,7 +97,7 @@ class Search:
         return [*_lead(random, state, fault.at, PROCESSES[processes][-2]), fault]
 
     def _fault(self, random: Random, kind: str, processes: Processes) -> Fault:
-        seconds = [*range(int(BEGIN), int(END))]
+        seconds = [*range(int(BEGIN), int(_END))]
         (second,) = random.choices(seconds, [1.0 / (1.0 + self._moments[kind, one]) for one in seconds])
         where = random.choice(PROCESSES[processes]) if kind in OF_PROCESS else ""
         lasts = min(3.0, random.expovariate(1.0)) + (4.5 if kind == "slow turns" else 0.0)
@@ -132,7 +133,7 @@ class Search:
         if not faults:
             return faults
         k, other = random.randrange(len(faults)), random.choice(faults)
-        at = min(END, other.at + random.expovariate(5.0)) if random.random() < 0.5 else random.uniform(BEGIN, END)
+        at = min(_END, other.at + random.expovariate(5.0)) if random.random() < 0.5 else random.uniform(BEGIN, _END)
         return [*faults[:k], replace(faults[k], at=at), *faults[k + 1 :]]
 
     def _swap(self, random: Random, faults: list[Fault], processes: Processes) -> list[Fault]:
@@ -220,7 +221,7 @@ def search(store: Store, seed: int, seconds: float, cores: int | None = None) ->
         return found, store.add(found, branches)
 
     try:
-        with workers(cores, _warm) as pool:
+        with workers(cores, warm) as pool:
             while time.monotonic() < end:
                 if len(waiting) >= _AHEAD:
                     yield take()
@@ -231,20 +232,8 @@ def search(store: Store, seed: int, seconds: float, cores: int | None = None) ->
         store.save()
 
 
-_branches = Branches()
-
-
-def _warm() -> None:
-    warm()
-    _branches.begin()
+_starts = Starts(Branches())
 
 
 def _run_apart(schedule: Schedule) -> tuple[Found, list[str]]:
-    return apart(partial(run_measured, schedule))
-
-
-def run_measured(schedule: Schedule) -> tuple[Found, list[str]]:
-    """Run a schedule; returns its result and the branches that it ran."""
-    _branches.begin()
-    found = schedule.run()
-    return found, _branches.ran()
+    return _starts.run(schedule.seed, schedule.faults, schedule.processes, schedule.breaks)

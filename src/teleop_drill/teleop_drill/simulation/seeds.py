@@ -1,10 +1,12 @@
 """Seeds: runs random schedules, checks the laws in each, and finds the shortest schedule that breaks a law."""
 
 import os
+import shutil
 import tempfile
 import traceback
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -18,10 +20,11 @@ from teleop_core.session import api
 from teleop_drill.drill import hand
 from teleop_drill.drill.numbers import Numbers
 from teleop_drill.simulation import sometimes
+from teleop_drill.simulation.branches import Branches
 from teleop_drill.simulation.bus import Bus
 from teleop_drill.simulation.drilled_session import DrilledSession
 from teleop_drill.simulation.laws import Broken, Laws
-from teleop_drill.simulation.machine import Machine, Process
+from teleop_drill.simulation.machine import Machine
 from teleop_drill.simulation.reach import BEGIN_NS
 from teleop_drill.simulation.scheduler import Scheduler
 from teleop_drill.simulation.schedules import KINDS, Fault, draw
@@ -46,6 +49,7 @@ _HINDER = (
 )  # fmt: skip
 """Faults under which a killed recorder may lose more than the last messages."""
 _ROUND = 20  # schedules that are chosen together
+_STARTS = 4  # ways in which sessions start
 
 
 @dataclass
@@ -88,6 +92,9 @@ def run_seed(
 ) -> Found:
     """Run one schedule.
 
+    A session starts in one of :data:`_STARTS` ways, which the seed chooses. Then the seed itself gives all random
+    numbers. So schedules can share a start, see :class:`Starts`.
+
     Args:
         seed: Seed of the machine, and of the schedule if no faults are given.
         faults: Faults of the schedule; None to draw them.
@@ -96,38 +103,118 @@ def run_seed(
         breaks: Share of the clock readings after which another thread of the process runs.
     """
     planned = draw(seed, PROCESSES[processes]) if faults is None else tuple(faults)
-    with tempfile.TemporaryDirectory(prefix="drill_") as place:
-        machine = Machine(Scheduler(seed, breaks))
-        bus = Bus(machine.scheduler)
+    with _inside(folder):
+        return _Run(seed % _STARTS, processes, breaks).run(seed, planned)
+
+
+@contextmanager
+def _inside(folder: Path | None = None) -> Iterator[Path]:
+    """Work in a folder, or in one of its own that is removed: names of recordings are the same wherever they lie."""
+    before = Path.cwd()
+    with tempfile.TemporaryDirectory(prefix="drill_") as own:
+        place = Path(own) if folder is None else folder.absolute()
+        place.mkdir(parents=True, exist_ok=True)
+        os.chdir(place)
         try:
-            found: Found = machine.run(
-                lambda owner: _Run(bus, owner, Found(seed, planned, processes, breaks), folder or Path(place)).run()
-            )
-        except Exception as error:  # an error in one schedule must not end all others
-            at = 1e-9 * (machine.scheduler.now_ns - BEGIN_NS)
-            text = "".join(traceback.format_exception(error)[-2:])
-            found = Found(seed, planned, processes, breaks, (Broken("runs", at, text),), seconds=at)
-    return found
+            yield place
+        finally:
+            os.chdir(before)
+
+
+class Starts:
+    """Sessions that have started and wait for schedules; each schedule goes on in a copy of this process (``fork``).
+
+    A schedule has the same result as by :func:`run_seed`.
+
+    Args:
+        branches: Counts the branches of the code; None to count none.
+    """
+
+    def __init__(self, branches: Branches | None = None) -> None:
+        self._branches = branches
+        self._waiting: dict[tuple[int, Processes, float], tuple[_Run, Path, list[str]]] = {}
+        self._ends = ExitStack()
+
+    def run(
+        self, seed: int, faults: Sequence[Fault] | None, processes: Processes, breaks: float
+    ) -> tuple[Found, list[str]]:
+        """Run one schedule, see :func:`run_seed`; returns its result and the branches that ran."""
+        planned = draw(seed, PROCESSES[processes]) if faults is None else tuple(faults)
+        key = seed % _STARTS, processes, breaks
+        if key not in self._waiting:
+            place = Path(self._ends.enter_context(tempfile.TemporaryDirectory(prefix="drill_"))).resolve()
+            self._begin()
+            with _inside(place):
+                self._waiting[key] = _Run(*key), place, self._ran()
+        return apart(partial(self._go_on, key, seed, planned))
+
+    def _go_on(self, key: tuple[int, Processes, float], seed: int, faults: Sequence[Fault]) -> tuple[Found, list[str]]:
+        """Run a schedule in a copy of the process that started the session, with copies of its files."""
+        run, place, ran = self._waiting[key]
+        self._begin()
+        with _inside() as own:
+            shutil.copytree(place, own, dirs_exist_ok=True)
+            for number in map(int, os.listdir("/proc/self/fd")):
+                with suppress(OSError):  # the descriptor of the list itself is closed again
+                    file = Path(os.readlink(f"/proc/self/fd/{number}"))
+                    if file.is_relative_to(place):
+                        _reopen(number, own / file.relative_to(place))
+            found = run.run(seed, faults)
+        return found, sorted({*ran, *self._ran()})
+
+    def _begin(self) -> None:
+        if self._branches is not None:
+            self._branches.begin()
+
+    def _ran(self) -> list[str]:
+        return [] if self._branches is None else self._branches.ran()
+
+
+def _reopen(number: int, file: Path) -> None:
+    """Let a file descriptor refer to another file at the same position."""
+    other = os.open(file, os.O_RDWR)
+    os.lseek(other, os.lseek(number, 0, os.SEEK_CUR), os.SEEK_SET)
+    os.dup2(other, number)
+    os.close(other)
 
 
 class _Run:
-    """One running schedule."""
+    """A session that has started, and the schedule that it runs then."""
 
-    def __init__(self, bus: Bus, owner: Process, found: Found, folder: Path) -> None:
-        bus.watch(owner)
-        self._bus = bus
+    def __init__(self, start: int, processes: Processes, breaks: float) -> None:
         made = api.configuration("free_motion", texts=(*_CIRCLE, "real_time.priority=20"))
         numbers = Numbers.of(made)
-        self._found, self._scheduler = found, owner.machine.scheduler
-        self._stage = DrilledSession(bus, owner, made, numbers.robot, folder, found.processes)
+        machine = Machine(Scheduler(start, breaks))
+        self._scheduler, self._bus = machine.scheduler, Bus(machine.scheduler)
+        owner = machine.outsider("drill")
+        self._bus.watch(owner)
+        self._found = Found(start, (), processes, breaks)
+        self._stage = DrilledSession(self._bus, owner, made, numbers.robot, Path(), processes)
         self._laws = Laws(self._stage, numbers)
         self._ends: list[Callable[[], None]] = []
+        self._error: Exception | None = None
+        try:
+            self._stage.session.start()
+            self._laws.judge_recovery(self._await(_START), _START)
+        except Exception as error:
+            self._error = error
 
-    def run(self) -> Found:
-        """Run the schedule."""
-        begin_ns = self._scheduler.now_ns
-        self._stage.session.start()
-        self._laws.judge_recovery(self._await(_START), _START)
+    def run(self, seed: int, faults: Sequence[Fault]) -> Found:
+        """Run a schedule; an error in it breaks the law ``runs``, because it must not end all other schedules."""
+        self._found = Found(seed, tuple(faults), self._found.processes, self._found.breaks)
+        try:
+            if self._error is not None:
+                raise self._error
+            self._scheduler.seed_again(seed)
+            self._judge()
+        except Exception as error:
+            at = 1e-9 * (self._scheduler.now_ns - BEGIN_NS)
+            text = "".join(traceback.format_exception(error)[-2:])
+            broken = (Broken("runs", at, text),)
+            return Found(seed, tuple(faults), self._found.processes, self._found.breaks, broken, seconds=at)
+        return self._found
+
+    def _judge(self) -> None:
         self._laws.begin_ns = self._scheduler.now_ns
         for fault in self._found.faults:
             at_ns = self._laws.begin_ns + round(1e9 * fault.at)
@@ -141,7 +228,7 @@ class _Run:
         self._laws.judge_recovery(recovery, _CURED)
         if recovery is not None:
             self._stage.sometimes.update({sometimes.recovered(fault.kind) for fault in self._found.faults})
-        self._found.seconds = 1e-9 * (self._scheduler.now_ns - begin_ns)
+        self._found.seconds = 1e-9 * (self._scheduler.now_ns - BEGIN_NS)
         for process in self._stage.session.running.values():
             self._stage.killed.add(process)  # from now on the processes are ordered to end
         (first, *more), was_killed = self._stage.session.recordings, self._was("kill", "recorder")
@@ -160,11 +247,11 @@ class _Run:
             self._laws.judge_recording(first, {} if recorder is None else recorder.values())
         elif killed_ns is not None and not any(map(self._was, _HINDER)):
             self._laws.judge_killed(first, killed_ns)
+        self._laws.finish()
         self._found.broken = tuple(self._laws.broken.values())
         self._found.looks.update(self._laws.looks)
         self._found.under.update(self._laws.under)
         self._found.sometimes.update(self._stage.sometimes)
-        return self._found
 
     def _begin(self, fault: Fault) -> None:
         state, seen = self._stage.state, self._stage.sometimes
@@ -247,6 +334,9 @@ def run_seeds(
                 yield found
 
 
+_starts = Starts()
+
+
 def warm() -> None:
     """Load and compile whatever schedules need, so that copies of this process have it."""
     for processes in PROCESSES:
@@ -254,7 +344,7 @@ def warm() -> None:
 
 
 def _run_apart(processes: Processes, breaks: float, seed: int) -> Found:
-    return apart(partial(run_seed, seed, processes=processes, breaks=breaks))
+    return _starts.run(seed, None, processes, breaks)[0]
 
 
 def rarest(seeds: Sequence[int], met: Counter[tuple[str, str]], processes: Processes) -> int:
