@@ -146,7 +146,7 @@ class Laws:
         self._seen_state, self._since = -1, 0.0
         self._offset_ns = self._stepped_ns = self._old = 0
         self._resting_since: float | None = None
-        self._moved_at = 0.0
+        self._moved_at, self._in_motion = 0.0, 0
         self._press: tuple[int, bool] | None = None
         """Newest press that is not yet in force: number of the button, and whether the press was sent to the slave."""
         self._obey_by, self._was_idle, self._was_driven = 0.0, False, False
@@ -342,7 +342,10 @@ class Laws:
             self._has_moved = False
             self._judge_block()
         moves = self._worked - self._moved_at < 1e-9 * _LOOK_NS
-        if moves and state != State.ENABLED and in_force > self._braking + 0.3:
+        is_moving = moves and state != State.ENABLED and in_force > self._braking + 0.3
+        # A setpoint that goes to an arm whose position was unknown is no motion of the arm.
+        self._in_motion = self._in_motion + 1 if is_moving and not slave.stage.state["must_join"] else 0
+        if self._in_motion > 1:
             self._break("motion", f"moves {in_force:.2f} s after it became {State(state).name}")
         if state != State.ENABLED and slave.stage.state["is_busy"]:
             self._break("motion", f"has an unfinished move while it is {State(state).name}")
