@@ -3,7 +3,8 @@
 import math
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ import numpy as np
 
 from teleop_core.bags.messages import layout
 from teleop_core.bags.reader import Bag, recover
+from teleop_core.base.errors import RecordingError
 from teleop_core.graph.operation import State
 from teleop_core.graph.signals import DT
 from teleop_core.graph.topics import NO_COMMAND_NS, SLAVE_SETPOINT_JS
@@ -438,6 +440,14 @@ class Laws:
     def finish(self) -> None:
         """Judge the last setpoints."""
         self._judge_block()
+
+    @contextmanager
+    def reading(self) -> Iterator[None]:
+        """Take a recording that cannot be read for a breach of the law ``recorded``."""
+        try:
+            yield
+        except RecordingError as error:
+            self._break("recorded", str(error))
 
     def judge_recording(self, path: Path, told: Mapping[str, str]) -> None:
         """Check that all sent messages (all saved ones if the disk failed) are recorded or counted as lost.

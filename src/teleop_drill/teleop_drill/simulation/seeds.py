@@ -241,12 +241,13 @@ class _Run:
         outlives = self._stage.lost_disk - self._laws.lost_recorders
         self._stage.sometimes[sometimes.DISK_STAYS] += any(not one.is_dead for one in outlives)
         self._stage.session.close()
-        if self._was("clock step") or self._was("clock drift"):
-            pass  # the times of a recording are those of the clock
-        elif not was_killed:
-            self._laws.judge_recording(first, {} if recorder is None else recorder.values())
-        elif killed_ns is not None and not any(map(self._was, _HINDER)):
-            self._laws.judge_killed(first, killed_ns)
+        with self._laws.reading():
+            if self._was("clock step") or self._was("clock drift"):
+                pass  # the times of a recording are those of the clock
+            elif not was_killed:
+                self._laws.judge_recording(first, {} if recorder is None else recorder.values())
+            elif killed_ns is not None and not any(map(self._was, _HINDER)):
+                self._laws.judge_killed(first, killed_ns)
         self._laws.finish()
         self._found.broken = tuple(self._laws.broken.values())
         self._found.looks.update(self._laws.looks)
