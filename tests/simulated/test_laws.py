@@ -2,7 +2,8 @@
 
 import pytest
 
-from mutants import MUTANTS, Mutant, scheduled
+from broken_copies import MUTANTS, Mutant
+from mutants import scheduled
 from teleop_core.nodes.crews import Processes
 from teleop_core.slave.operation.states import COMMANDS
 from teleop_drill.simulation.laws import LAWS

@@ -3,6 +3,7 @@
 import json
 import os
 import shlex
+import signal
 import subprocess
 import sys
 from collections import Counter
@@ -181,6 +182,43 @@ def test_a_schedule_that_broke_a_law_is_kept_though_it_met_nothing_new(tmp_path:
     assert store.add(found) == ()
     assert Store(tmp_path).kept[0].broken == ("stop",)
     assert store.lines()[-1] == "schedule_000000.json breaks stop"
+
+
+def add_nine(store: Store) -> None:
+    """Add nine results; a third of them meets something first."""
+    for k in range(9):
+        name = ("press_in_FAULT", "kill_in_PAUSED", "press_in_none")[k // 3]
+        store.add(met(Schedule(k, draw(k, SIDES)), kill_in_FAULT=1, **{name: 1}), [f"slave.py:{k // 3}"])
+
+
+KILLED = """
+import os, sys
+from pathlib import Path
+sys.path.insert(0, sys.argv[1])
+from test_search import Store, add_nine
+folder = Path(sys.argv[2])
+add_nine(Store(folder, lambda: 0.0))
+with open(folder / "counts_since.jsonl", "a") as file:
+    file.write('{"number": 9, "times"')
+    file.flush()
+    os.kill(os.getpid(), 9)
+"""
+
+
+def test_a_search_that_is_killed_loses_no_schedule_that_had_ended(tmp_path: Path) -> None:
+    """All counts are written seldom; lines of the schedules since then stand beside them."""
+    whole, folder = Store(tmp_path / "whole"), tmp_path / "killed"
+    add_nine(whole)
+    whole.save()
+    given = [sys.executable, "-c", KILLED, str(Path(__file__).parent), str(folder)]
+    assert subprocess.run(given, check=False).returncode == -signal.SIGKILL
+    assert json.loads((folder / "counts.json").read_text(encoding="utf-8"))["sessions"] == 1
+    again = Store(folder)
+    assert (again.coverage, again.times, again.kept) == (whole.coverage, whole.times, whole.kept)
+    assert again.coverage.sessions == 9
+    assert Search(again, 5).choose() == Search(whole, 5).choose()
+    assert not (folder / "counts_since.jsonl").exists()
+    assert Store(folder).coverage == again.coverage
 
 
 @pytest.mark.parametrize(

@@ -15,14 +15,15 @@ import subprocess
 import sys
 import time
 
-from mutants import ROOT, Mutant, tree
+from broken_copies import Mutant
+from mutants import ROOT, tree
 
 UNIT = "tests/unit/test_"
 
 
-def _mutant(name: str, text: str, file: str, before: str, after: str, *tests: str) -> Mutant:
+def _mutant(name: str, text: str, file: str, before: str, after: str, *tests: str, past: str = "") -> Mutant:
     files = tuple(one if "/" in one else f"{UNIT}{one}.py" for one in tests)
-    return Mutant(name, text, ((file, before, after),), files)
+    return Mutant(name, text, ((file, before, after),), files, past=past)
 
 
 _CALLS = "tests/unit/refusals/test_calls.py"
@@ -73,7 +74,7 @@ CODE_MUTANTS = (
             "teleop_drill/nodes/conformance_arm.py",
             "            self.interrupt.check()\n", "", "tests/simulated/test_conformance.py"),
     _mutant("cut_untold", "who was killed with what it held back is not told", "nodes/feed.py",
-            "self.cut += sum(", "self.cut += 0 * sum(", "feed"),
+            "self.cut += sum(", "self.cut += 0 * sum(", "feed", past="0.7.0"),
     _mutant("unlike_taken", "messages of another form are read as numbers of the usual one", "bags/walk.py",
             "return wrong == 0", "return True", "bags_layouts"),
     _mutant("copies_unsent", "nodes send no copies for displays, so that frames and pages stand still",
@@ -83,12 +84,15 @@ CODE_MUTANTS = (
             "            self.stop()\n            return\n", "            pass\n", "tests/simulated/test_frames.py"),
     _mutant("late_behind", "what the middleware brings late stands behind newer samples of a feed", "nodes/recorder.py",
             "min(taken.came_ns, inside_ns)", "taken.came_ns", "tests/simulated/test_recordings_kept.py"),
+    _mutant("counts_lost", "a search that is killed forgets the schedules since its counts were written",
+            "teleop_drill/simulation/store.py", "self.coverage.merge(Coverage.of(one))", "pass",
+            "tests/simulated/test_search.py"),
     _mutant("lost_before", "what was on its way as a fault began is lost by the fault before",
             "teleop_drill/drill/recordings.py", "starts = [ns - _ON_THE_WAY_NS", "starts = [ns - 0 * _ON_THE_WAY_NS",
             "tests/unit/test_drill.py"),
     _mutant("old_clock", "stamps of a clock that was ahead shut out all later ones",
             "slave/commands.py", "    if stamp_ns < s.seen_ns - ownership.AHEAD_NS:", "    if False:",
-            "slave_sim"),
+            "slave_sim", past="0.7.0"),
     _mutant("jumping_hand", "a hand that a program leads jumps to its command",
             "session/stepped.py", "np.minimum(share, 1.0)", "1.0", "stepping"),
     _mutant("blind", "an operator who sees does not wait for what it sees", _SEEING,
@@ -236,9 +240,9 @@ CODE_MUTANTS = (
             "    runner.reset()\n", "", "warming"),
     _mutant("warm_signals", "a step for practice leaves its outputs", "graph/warming.py",
             "    assign(runner.signals, before)\n", "", "warming"),
-    _mutant("last_scaled", "speeds of joints are scaled for the last one that is too fast (as in "
-            "moveit2 #2540)", "slave/velocity.py", "share = min(share, most / fast)",
-            "share = most / fast", "motion_commands"),
+    _mutant("last_scaled", "speeds of joints are scaled for the last one that is too fast",
+            "slave/velocity.py", "share = min(share, most / fast)",
+            "share = most / fast", "motion_commands", past="moveit2 #2540"),
     _mutant("thaw_leads", "a bridge that stood still leads on from where the arm was",
             "slave/bridges/arm_bridge.py", "if is_late and self.lead_arm.has_lost(",
             "if False and self.lead_arm.has_lost(", "arm_bridge"),
@@ -412,19 +416,20 @@ CODE_MUTANTS = (
     _mutant("aligned_everywhere", "every arm is aligned as is published for the RCRT-1", "session/configuration.py",
             "PUBLISHED.get(str(robot), {})", 'PUBLISHED["rcrt1"]', "real_arms"),
     _mutant("any_leader", "every stream of commands moves the arm beside the first", "slave/ownership.py",
-            "return now_ns - s.led_ns <= longest_gap(p, s)", "return False", "motion_commands"),
+            "return now_ns - s.led_ns <= longest_gap(p, s)", "return False", "motion_commands", past="0.7.0"),
     _mutant("any_age", "a command of any age moves the arm", "slave/ownership.py",
-            "or (p.oldest_ns > 0 and stamp_ns < now_ns - p.oldest_ns)", "", "motion_commands"),
+            "or (p.oldest_ns > 0 and stamp_ns < now_ns - p.oldest_ns)", "", "motion_commands", past="0.7.0"),
     _mutant("old_enable", "an enable of any age wakes the arm", "nodes/crtk.py",
             "(aged if name not in _STOPPING else None) or self._request(name)", "self._request(name)",
-            "tests/simulated/test_crtk.py"),
+            "tests/simulated/test_crtk.py", past="0.7.0"),
     _mutant("any_speed", "a twist that no arm has is taken", "slave/motion_commands.py",
             "if (np.abs(wanted) > most).any():", "if False:", "motion_commands"),
     _mutant("any_setpoint", "a setpoint that is not a number is sent", "slave/step.py",
             "        if not math.isfinite(s.setpoint[i]):", "        if False:", "motion_commands"),
     _mutant("join_jumps", "on its way to the arm the setpoint exceeds the tool's speed", "slave/step.py",
             "        s.must_join = _JOINING if s.must_join else 0",
-            "        s.must_join = _JOINING if s.must_join else 0\n        s.step[0] = 0.0", "motion_commands"),
+            "        s.must_join = _JOINING if s.must_join else 0\n        s.step[0] = 0.0", "motion_commands",
+            past="0.7.0"),
     _mutant("reset_stays", "a reset keeps a setpoint far from the arm", "slave/operation/states.py",
             "s.is_stopped, s.must_join = 0, AFTER_RESET", "s.is_stopped = 0", "motion_commands"),
     _mutant("gap_untold", "a gap of the file is blamed on hand and machine", "evaluation/metrics/breaks.py",
@@ -651,7 +656,7 @@ CODE_MUTANTS = (
             "slave/operation/presses.py", "return min(self._heard_ns.values(), default=None)",
             "return max(self._heard_ns.values(), default=None)", "presses"),
     _mutant("late_button", "what a button said before it was found is nothing",
-            "slave/operation/presses.py", "number - 1 if is_idle else 0", "number - 1", "presses"),
+            "slave/operation/presses.py", "number - 1 if is_idle else 0", "number - 1", "presses", past="0.7.0"),
     _mutant("resume_early", "resume is taken while the arm moves", "slave/operation/states.py",
             "and s.is_moving:", "and s.is_moving > 1:", "operation_states"),
     _mutant("part_untold", "a verdict does not name a part that is not known",

@@ -14,8 +14,9 @@ import pytest
 from numpy.typing import ArrayLike
 from scipy import signal
 
+from broken_copies import MUTANTS
 from code_mutants import CODE_MUTANTS
-from mutants import MUTANTS, ROOT, changed
+from mutants import ROOT, changed, every
 from present import present
 from teleop_core.bags import reader, reports
 from teleop_core.bags.writer import BagWriter
@@ -32,6 +33,7 @@ from teleop_drill.drill.exercise import Exercise
 from teleop_drill.drill.numbers import Numbers, Scheduling
 from teleop_drill.drill.outcome import FaultOutcome
 from teleop_drill.drill.recordings import Recorded, check_recording, judge_recording, missing, told_lost
+from teleop_drill.simulation.laws import LAWS
 
 MS = 1_000_000
 DT = 1e-3
@@ -424,9 +426,20 @@ def test_every_mutant_fits_the_source_and_names_rows_that_there_are() -> None:
             assert {one.name for one in drill.chosen(rows, is_composed=is_composed)} >= set(rows), mutant.name
 
 
-def test_twelve_reports_of_bugs_in_public_stacks_have_a_mutant() -> None:
-    texts = " ".join(one.text for one in (*MUTANTS, *CODE_MUTANTS))
-    assert len(set(re.findall(r"[\w-]+ #\d+", texts))) >= 12
+def test_forty_faults_of_the_past_have_a_mutant_and_a_row_of_the_page() -> None:
+    """Among them are twelve that were reported of public stacks."""
+    past = {one.name: one for one in every() if one.past}
+    assert len(past) >= 40
+    assert len(set(re.findall(r"[\w-]+ #\d+", " ".join(one.past for one in past.values())))) >= 12
+    text = (ROOT / "docs/simulation.md").read_text(encoding="utf-8")
+    section = text.partition("\n## Bugs of the past\n")[2].partition("\n## ")[0]
+    rows = re.findall(r"^\| `(\w+)`: ([^|]*) \| ([^|]*) \| (\d+) \| ([^|]*) \|$", section, re.MULTILINE)
+    assert {name: (what, where) for name, what, where, _, _ in rows} == {
+        name: (one.text, one.past) for name, one in past.items()
+    }
+    found = [law for *_, law in rows if law != "not found"]
+    assert {law.strip("`") for laws in found for law in laws.split(", ")} <= {*LAWS, "runs", "starts"}
+    assert f"{len(found)} of {len(rows)}" in section
 
 
 def test_every_code_mutant_fits_the_source_and_names_files_of_tests() -> None:

@@ -84,8 +84,9 @@ class Disk:
         return taken
 
     def cut(self, file: BinaryIO, size: int) -> None:
-        """Truncate a file to ``size`` bytes; raise OSError if the disk has failed."""
-        self._insist()
+        """Truncate a file to ``size`` bytes; raise OSError if the disk has failed. A full disk still truncates."""
+        if self._process.disk_error != errno.ENOSPC:
+            self._insist()
         SYSTEM.cut(file, size)
 
     def sync(self, file: BinaryIO) -> None:

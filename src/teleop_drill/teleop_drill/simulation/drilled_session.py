@@ -1,11 +1,12 @@
 """Stage: a session on a simulated machine, and the faults and commands that a schedule applies to it."""
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from geometry_msgs.msg import TwistStamped
 from lifecycle_msgs.srv import ChangeState
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool
@@ -19,6 +20,7 @@ from teleop_core.graph.topics import OPERATION, SLAVE_OPERATION, TELEOP_STATE, T
 from teleop_core.kernels.geometry import Array
 from teleop_core.middleware.platform import Qos, Taken
 from teleop_core.nodes.crews import Processes, crews
+from teleop_core.nodes.crtk import STATE_COMMAND
 from teleop_core.nodes.observer import ReportReader
 from teleop_core.nodes.operation import STOP_TOPIC
 from teleop_core.nodes.streams import message_type
@@ -87,6 +89,12 @@ class DrilledSession:
         self._publishers: dict[str, Any] = {}
         self.sometimes: Counter[str] = Counter()
         """How often each event of :mod:`sometimes` was met."""
+        self.asked: list[str] = []
+        """Commands that were sent, in their order."""
+        self.driven_ns = 0
+        """Time at which a speed command that was not old was last sent [ns]."""
+        self.killed_ns: dict[Process, int] = {}
+        """Time at which processes were killed [ns]."""
         self.operation: dict[str, float] = {}
         """Newest report of the slave, by the names of its numbers."""
         self.is_following = False
@@ -139,6 +147,7 @@ class DrilledSession:
         process = self.process(name)
         self.sometimes[sometimes.AGAIN] += any(one.name == process.name for one in self.killed)
         self.killed.add(process)
+        self.killed_ns[process] = self.machine.scheduler.now_ns
         self.kills += name != RECORDER_NAME
         process.end(-9, is_orderly=False)
 
@@ -176,6 +185,7 @@ class DrilledSession:
     def command(self, name: str) -> None:
         """Send a request to the slave without waiting for the answer."""
         self.sometimes[sometimes.asked(name, self.state)] += 1
+        self.asked.append(name)
         self._clients[name].call_async(Trigger.Request())
 
     def lead(self, *, by_hand: bool) -> None:
@@ -184,16 +194,46 @@ class DrilledSession:
         request.transition.label = "activate" if by_hand else "deactivate"
         self._hand.call_async(request)
 
-    def drive(self, speeds: Array) -> None:
-        """Send speeds (n,) of the joints [rad/s or m/s]."""
-        self._speeds.publish(JointState(velocity=speeds.tolist()))
+    def drive(self, speeds: Array, age_ns: int = 0) -> None:
+        """Send speeds (n,) of the joints [rad/s or m/s], with a stamp of some age [ns]; 0: without a stamp."""
+        message = JointState(velocity=speeds.tolist())
+        if age_ns:
+            self._stamp(message, age_ns)
+        else:
+            self.driven_ns = self.machine.scheduler.now_ns
+        self._speeds.publish(message)
+
+    def ask_again(self, names: Sequence[str], age_ns: int) -> None:
+        """Send commands to the slave with a stamp of some age [ns], as a client whose messages come late."""
+        for name in names:
+            message = message_type(STATE_COMMAND)(string=name)
+            self._stamp(message, age_ns)
+            self._publisher("slave/state_command", type(message)).publish(message)
+
+    def _stamp(self, message: Any, age_ns: int) -> None:
+        stamp_ns = self.platform.time_ns() - age_ns
+        message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp_ns, 1_000_000_000)
+
+    def drive_tip(self, speed: float) -> None:
+        """Send a speed of the tip along all axes of the base [m/s]."""
+        self.driven_ns = self.machine.scheduler.now_ns
+        message = TwistStamped()
+        message.twist.linear.x = message.twist.linear.y = message.twist.linear.z = speed
+        self._publisher("slave/servo_cv", TwistStamped).publish(message)
 
     def publish(self, topic: Topic, data: bytes) -> None:
         """Send bytes on a topic, as an additional publisher."""
-        if topic.name not in self._publishers:
-            kind = message_type(topic.kind.ros_type)
-            self._publishers[topic.name] = self._node.create_publisher(kind, f"/{topic.name}", Qos(depth=1))
-        self._publishers[topic.name].publish(data)
+        self._publisher(topic.name, message_type(topic.kind.ros_type)).publish(data)
+
+    def _publisher(self, name: str, kind: Any) -> Any:
+        if name not in self._publishers:
+            self._publishers[name] = self._node.create_publisher(kind, f"/{name}", Qos(depth=1))
+        return self._publishers[name]
+
+    @property
+    def senders(self) -> set[bytes]:
+        """Publishers of the drill, apart from its buttons and speeds."""
+        return {one.sender for one in self._publishers.values()}
 
     def every(self, period: float, work: Callable[[], None]) -> Callable[[], None]:
         """Repeat an action with a period [s]; returns the function that ends it."""

@@ -3,7 +3,8 @@
 import math
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ import numpy as np
 
 from teleop_core.bags.messages import layout
 from teleop_core.bags.reader import Bag, recover
+from teleop_core.base.errors import RecordingError
 from teleop_core.graph.operation import State
 from teleop_core.graph.topics import NO_COMMAND_NS, SLAVE_SETPOINT_JS
 from teleop_core.kernels.fields import Cells
@@ -20,6 +22,7 @@ from teleop_core.slave.commands import CommandStatus
 from teleop_core.slave.velocity import MotionSource
 from teleop_drill.drill.numbers import Numbers
 from teleop_drill.simulation import sometimes
+from teleop_drill.simulation.changes import Changes
 from teleop_drill.simulation.drilled_session import DrilledSession
 from teleop_drill.simulation.machine import Process
 from teleop_drill.simulation.owner import Owner, stamp_of
@@ -45,6 +48,17 @@ _FOUND_NS = 1_600_000_000
 """Time in which a recorder discovers all topics [ns]."""
 _ON_THE_WAY_NS = 300_000_000
 """Time in which a sent message is recorded [ns]."""
+_SOON = 0.06
+"""Delay of a machine that is not busy [s]."""
+_ENGAGING_NS = 200_000_000
+"""Time in which an arm that begins to follow moves no faster than the hand [ns]."""
+_REST = 0.25
+"""Longest time until an arm without a new speed command is at rest, in addition to the command timeout and braking [s].
+"""
+_OLDEST_NS = 6_000_000_000
+"""Age of a speed command that moves an arm no more [ns]: ``operation.oldest_command``, and a second."""
+_KEPT_NS = 250_000_000
+"""Longest time before its end from which a recorder that is killed loses messages [ns]."""
 _OLD = 1.0
 """Largest age of a command that an enabled arm may follow [s]."""
 _JOINING = 20
@@ -58,7 +72,8 @@ _SLOW_NS, _GIVEN_WAY_NS = 1_500_000, 4_500_000_000
 and a turn of the machine."""
 _FOLLOWING = int(MotionSource.FOLLOWING)
 LAWS = (
-    "speed", "tool speed", "motion", "told", "stop", "owner", "age", "way", "ends", "queues", "recorded", "recovery",
+    "speed", "tool speed", "motion", "told", "stop", "asked", "pause", "engage", "owner", "age", "way", "ends",
+    "queues", "recorded", "recovery",
 )  # fmt: skip
 """Names of all laws."""
 
@@ -126,11 +141,16 @@ class Laws:
         self._seen_state, self._since = -1, 0.0
         self._offset_ns = self._stepped_ns = self._old = 0
         self._resting_since: float | None = None
-        self._moved_at = 0.0
+        self._moved_at, self._in_motion = 0.0, 0
         self._press: tuple[int, bool] | None = None
         """Newest press that is not yet in force: number of the button, and whether the press was sent to the slave."""
-        self._obey_by, self._was_idle = 0.0, False
+        self._obey_by, self._was_idle, self._was_driven = 0.0, False, False
         self._presses = 0
+        self._drive_ns, self._driven_at, self._followed_ns, self._stamp_ns = 0, 0.0, 0, 0
+        self._leader = b""
+        self._engaged: tuple[int, list[float]] | None = None
+        """When the arm began to follow [ns], and where the tip was then."""
+        self._changes = Changes(stage, numbers, self._count, self._break)
         self._slow_ns: dict[Process, int] = {}  # time for which a process has had slow turns
         self._sent_ns: dict[bytes, list[int]] = {}  # times of sending, by publisher
         """Sending times of setpoints by the system's clock [ns], by publisher."""
@@ -166,6 +186,7 @@ class Laws:
             self._cells = None if self._led is None else Cells(self._led.state)
             self._status = slave.row.number("command_status")
         self._judge_owner(process, stamp_ns)
+        self._judge_engage(data)
         before, self._joints = self._joints, data[self._place]
         self._has_moved |= before != self._joints
         if before and self._status[0] == CommandStatus.FRESH:  # otherwise the slave may still brake
@@ -178,7 +199,37 @@ class Laws:
         is_driven = cells is not None and not cells["is_busy"] and cells["motion"] != _FOLLOWING
         if wrong := self._owner.judge(process, stamp_ns, is_driven=is_driven):
             self._break("owner", wrong)
+        age_ns = self._scheduler.now_ns - self._stage.driven_ns
+        if is_driven and not self._was_driven and age_ns > _OLDEST_NS:
+            self._break("age", f"follows a speed command, although the last one is {1e-9 * age_ns:.1f} s old")
+        self._was_driven = is_driven
         self._stage.commanded_ns = self._owner.followed_ns
+
+    def _judge_engage(self, data: bytes) -> None:
+        """Check that an arm that begins to follow does not run to where the hand is, if nothing is late."""
+        now_ns, before_ns, self._followed_ns = self._scheduler.now_ns, self._followed_ns, self._owner.followed_ns
+        if self._followed_ns - before_ns > 1e9 * _OLD:
+            is_new = self._worked - self._since < 1.5 * _OLD  # otherwise the hand may have led on behind a bad line
+            is_hand = self._owner.leader not in self._stage.senders
+            self._engaged = (now_ns, self._tip(data)) if is_new and is_hand and self._is_quiet() else None
+        if self._engaged is None or now_ns - self._engaged[0] < _ENGAGING_NS:
+            return
+        self._count("engage")
+        (since_ns, place), self._engaged = self._engaged, None
+        way = math.dist(self._tip(data), place)
+        if self._is_quiet() and way > 1.5e-9 * (now_ns - since_ns) * self._numbers.tip_speed:
+            self._break("engage", f"the tip went {1e3 * way:.0f} mm as it began to follow, faster than the hand")
+
+    def _tip(self, data: bytes) -> list[float]:
+        """Place of the tip in a setpoint [m]; not a number for bytes that are none."""
+        found = self._form.decode_one(data)
+        if found is None:
+            return [math.nan] * 3
+        place: list[float] = self._stage.robot.fk(found[1][: self._stage.robot.n])[:3, 3].tolist()
+        return place
+
+    def _is_quiet(self) -> bool:
+        return not self._stage.bus.lines and self._late() < _SOON
 
     def _judge_speed(self) -> None:
         """Check the speeds of the setpoints since the last call."""
@@ -208,9 +259,15 @@ class Laws:
         if stamp_ns == NO_COMMAND_NS or not moves:
             self._old = 0
             return
+        leader, before_ns = self._owner.leader, self._stamp_ns
+        is_back = leader == self._leader and stamp_ns < before_ns
+        self._leader, self._stamp_ns = leader, stamp_ns
         if self._scheduler.now_ns - self._stepped_ns < _AFTER_STEP_NS:
             return
         self._count("age")
+        if is_back:
+            older = 1e-6 * (before_ns - stamp_ns)
+            self._break("age", f"follows a command that is {older:.0f} ms older than the one before")
         master: Any = self._stage.session.node("haptic_master")
         # A process continues to use the clock with which it was started for its stamps.
         epoch_ns = getattr(master, "epoch_ns", offset_ns)
@@ -229,12 +286,17 @@ class Laws:
             self._process, stage.operation = process, {}
         if slave is not self._slave:
             self._slave, self._seen_state, self._press = slave, -1, None
+            self._changes.begin()
             self._presses = len(stage.presses)
             for button in stage.held:  # this slave never received a message of the button
                 self._press, self._obey_by = (button, False), math.inf
         works = slave is not None and slave.stage is not None and slave.is_at_work
-        if works and process is not None and not process.is_stopped:
+        if works and process is not None and process.is_stopped:
+            self._changes.stand(1e-9 * _LOOK_NS)
+        elif works and process is not None:
             self._worked += 1e-9 * _LOOK_NS
+            silence = 1e-9 * (self._scheduler.now_ns - self._owner.followed_ns)
+            self._changes.judge(slave, self._worked, self._late(), silence)
             self._judge_state(slave)
             self._judge_stop(slave, process)
         self._judge_ends()
@@ -244,19 +306,28 @@ class Laws:
     def _judge_state(self, slave: Any) -> None:
         """Check that an arm that must not move is at rest, and that its state is reported in time."""
         self._stage.sometimes[f"a command is {CommandStatus(int(slave.row['command_status'])).name}"] += 1
-        state = int(slave.stage.operation["state"])
+        state = int(slave.stage.state["state"])
         if state != self._seen_state:
             self._seen_state, self._since = state, self._worked
         in_force = self._worked - self._since
         self._count("motion")
-        if self._has_moved and state != State.ENABLED and in_force > self._braking + 0.2:
+        if self._stage.driven_ns != self._drive_ns:
+            self._drive_ns, self._driven_at = self._stage.driven_ns, self._worked
+        undriven = self._worked - self._driven_at - self._numbers.command_timeout - self._braking - self._late()
+        is_undriven = self._was_driven and undriven > _REST
+        if self._has_moved and (is_undriven or (state != State.ENABLED and in_force > self._braking + 0.2)):
             self._has_moved = False
             self._judge_speed()
         moves = self._worked - self._moved_at < 1e-9 * _LOOK_NS
-        if moves and state != State.ENABLED and in_force > self._braking + 0.3:
+        is_moving = moves and state != State.ENABLED and in_force > self._braking + 0.3
+        # A setpoint that goes to an arm whose position was unknown is no motion of the arm.
+        self._in_motion = self._in_motion + 1 if is_moving and not slave.stage.state["must_join"] else 0
+        if self._in_motion > 1:
             self._break("motion", f"moves {in_force:.2f} s after it became {State(state).name}")
-        if state != State.ENABLED and slave.stage.operation["is_busy"]:
+        if state != State.ENABLED and slave.stage.state["is_busy"]:
             self._break("motion", f"has an unfinished move while it is {State(state).name}")
+        if moves and is_undriven:
+            self._break("motion", f"moves {self._worked - self._driven_at:.2f} s after the last speed command")
         self._count("told")
         told = self._stage.operation.get("state")
         if in_force > _TELL and told != state:
@@ -283,6 +354,7 @@ class Laws:
         self._was_idle |= operation["state"] == State.DISABLED
         if math.isinf(self._obey_by) and (times := stage.found(button, process)) and times[1] <= now_ns:
             self._obey_by = self._worked + (_OBEY if is_sent else _DOUBT)
+            self._changes.hold(button, self._obey_by)
         is_over = not is_sent and self._was_idle and button not in stage.held
         if is_over or operation["is_stopped"] or operation["is_pressed"]:
             self._press = None
@@ -344,6 +416,14 @@ class Laws:
         """Judge the last setpoints."""
         self._judge_speed()
 
+    @contextmanager
+    def reading(self) -> Iterator[None]:
+        """Take a recording that cannot be read for a breach of the law ``recorded``."""
+        try:
+            yield
+        except RecordingError as error:
+            self._break("recorded", str(error))
+
     def judge_recording(self, path: Path, told: Mapping[str, str]) -> None:
         """Check that all sent messages (all saved ones if the disk failed) are recorded or counted as lost.
 
@@ -376,6 +456,21 @@ class Laws:
         lost = int(told.get(f"lost.{SLAVE_SETPOINT_JS.name}", 0))
         if sent - kept > lost + 1:
             self._break("recorded", f"{sent} setpoints were sent, {kept} recorded, {lost} counted")
+
+    def judge_killed(self, path: Path, killed_ns: int) -> None:
+        """Check that a killed recorder, whose disk and processor were sound, lost only the messages before its end.
+
+        Args:
+            path: Its recording.
+            killed_ns: Time at which it was killed [ns].
+        """
+        self._count("recorded")
+        until_ns = killed_ns + self._stage.machine.clock.ahead_ns(killed_ns) - _KEPT_NS
+        kept_ns = Bag(recover(path)[0]).read(SLAVE_SETPOINT_JS).log_ns
+        sent_ns = np.concatenate([np.array(times) for times in self._sent_ns.values()])
+        lost = int(np.sum((sent_ns > kept_ns[-1]) & (sent_ns < until_ns)))
+        if lost > 1:
+            self._break("recorded", f"a killed recorder lost {lost} setpoints that were sent long before its end")
 
     def judge_recovery(self, seconds: float | None, bound: float) -> None:
         """Check that after the recovery the arm follows again, or reports the reason why it does not.

@@ -39,6 +39,11 @@ class Owner:
         self._forget(None)
         bus.seen[_TOPIC], bus.heard[_TOPIC] = self._note_sent, self._note_taken
 
+    @property
+    def leader(self) -> bytes:
+        """Sender of the command that a setpoint followed last; empty before the first."""
+        return self._leader
+
     def _forget(self, process: Process | None) -> None:
         self._process, self._leader, self._is_driven = process, b"", False
         self._stamp_ns = self._new_ns = self.followed_ns = self._in_row = 0
@@ -54,6 +59,8 @@ class Owner:
         now_ns = self._bus.scheduler.now_ns
         if process is not self._process:
             self._forget(process)
+        if not stamp_ns:
+            return "a setpoint has the stamp 0, which clients take for none"
         begins, self._is_driven = is_driven and not self._is_driven, is_driven
         silence_ns = now_ns - self.followed_ns
         if begins and self._in_row >= _STREAM and silence_ns < self._timeout_ns:

@@ -45,13 +45,15 @@ class Coverage:
 
     def add(self, found: Found) -> None:
         """Add the result of a schedule."""
-        self.sessions += 1
-        self.seconds += found.seconds
-        self.met.update(found.met)
-        self.looks.update(found.looks)
-        self.under.update(found.under)
-        self.sometimes.update(found.sometimes)
-        self.broken.update(one.law for one in found.broken)
+        broken = Counter(one.law for one in found.broken)
+        self.merge(Coverage(1, found.seconds, found.met, found.looks, found.under, found.sometimes, broken))
+
+    def merge(self, other: "Coverage") -> None:
+        """Add the counts of other schedules."""
+        self.sessions += other.sessions
+        self.seconds += other.seconds
+        for name in ("met", "looks", "under", "sometimes", "broken"):
+            getattr(self, name).update(getattr(other, name))
 
     def table(self) -> list[list[str]]:
         """Table of faults by states of the arm, with the counts of each combination; the first row is the head."""

@@ -8,8 +8,10 @@ from random import Random
 import numpy as np
 
 from teleop_core.bags.messages import layout
-from teleop_core.graph.topics import MASTER_BUTTONS, SLAVE_SERVO_JP
+from teleop_core.graph.topics import MASTER_BUTTONS, MASTER_FILTERED_OUT, SLAVE_ENERGY, SLAVE_SERVO_JP, TASK_STATE
+from teleop_core.nodes.crtk import is_installed
 from teleop_core.slave.operation.states import COMMANDS
+from teleop_drill.simulation import sometimes
 from teleop_drill.simulation.bus import Line
 from teleop_drill.simulation.drilled_session import DrilledSession
 from teleop_drill.simulation.sometimes import RELEASE
@@ -26,6 +28,10 @@ NAMES = sorted((*COMMANDS, RELEASE))
 _LEADS = {"": 8, "disable": 2, "kill": 3, "pause": 4, "press": 2}
 """Commands before a fault, with their weights. Commands to states that faults rarely met have larger weights."""
 _CLOCK_NS = (200_000_000, 3_600_000_000_000)
+_FAR_NS = 60_000_000_000
+"""Distance of a wrong stamp from now [ns]."""
+_READ = (SLAVE_SERVO_JP, MASTER_FILTERED_OUT, SLAVE_ENERGY, TASK_STATE)
+"""Topics on which garbage comes; nobody else sends on the last three."""
 
 
 @dataclass(frozen=True)
@@ -89,6 +95,11 @@ def _led(lead: str, at: float, processes: tuple[str, ...]) -> list[Fault]:
 def commanded(at: float, name: str) -> Fault:
     """Fault that sends a command at a time [s]."""
     return Fault(at, "command", "", 0.1, (NAMES.index(name) + 0.5) / len(NAMES))
+
+
+def _form(fault: Fault, count: int) -> int:
+    """Which of several forms a fault has; the amount 0.5 gives form 0."""
+    return int(1e6 * fault.amount) % count
 
 
 def _stop(stage: DrilledSession, fault: Fault) -> Callable[[], None]:
@@ -160,9 +171,15 @@ def _failing_disk(error: int) -> Act:
     return lambda stage, _: stage.fail_disk(error)
 
 
-def _press(stage: DrilledSession, fault: Fault) -> Callable[[], None]:
-    button = int(1e6 * fault.amount) % 2
+def _press(stage: DrilledSession, fault: Fault) -> Callable[[], None] | None:
+    """Press a stop button; in a quarter of the cases it is released at once, and says so a dozen times."""
+    button = _form(fault, 2)
     stage.press(button, is_pressed=True)
+    if _form(fault, 8) in {2, 5}:
+        stage.sometimes[sometimes.TAPPED] += 1
+        for _ in range(12):
+            stage.press(button, is_pressed=False)
+        return None
     return lambda: stage.press(button, is_pressed=False)
 
 
@@ -171,16 +188,24 @@ def _command(stage: DrilledSession, fault: Fault) -> None:
 
 
 def _drive(stage: DrilledSession, fault: Fault) -> Callable[[], None]:
-    """Drive the joints as a CRTK client does, far beyond their speed limits.
+    """Drive the arm as a CRTK client does: joints far beyond their speed limits, or the tip at a speed that no arm has.
 
-    While the hand's commands arrive, the arm refuses commands of others. So this fault first stops the hand's commands.
+    While the hand's commands arrive, the arm refuses commands of others. So this fault first stops the hand's commands;
+    in one form it does not. In another form the commands are old when they come.
     """
+    form = _form(fault, 4)
     drives = stage.robot.drives
     assert drives is not None
     speeds = np.sin(np.arange(1.0, stage.robot.n + 1.0) * (1.0 + 9.0 * fault.amount))
     speeds *= 3.0 * drives.speed_limit
-    stage.lead(by_hand=False)
-    stop = stage.every(0.01, lambda: stage.drive(speeds))
+    if form:
+        stage.sometimes[(sometimes.BESIDE, sometimes.BEYOND, sometimes.OLD)[form - 1]] += 1
+    stage.lead(by_hand=form == 1)
+    if form == 2:
+        stop = stage.every(0.01, lambda: stage.drive_tip(1e307))
+    else:
+        age_ns = _FAR_NS if form == 3 else 0
+        stop = stage.every(0.01, lambda: stage.drive(speeds, age_ns))
 
     def give_back() -> None:
         stop()
@@ -190,22 +215,32 @@ def _drive(stage: DrilledSession, fault: Fault) -> Callable[[], None]:
 
 
 def _intrude(stage: DrilledSession, fault: Fault) -> Callable[[], None]:
-    """Publish joint commands near the present ones, as a second publisher of the same topic."""
+    """Publish joint commands near the present ones, as a second publisher of the same topic.
+
+    In two of four forms their stamps are a minute old, or a minute ahead. In another form old commands to enable the
+    arm come instead.
+    """
+    if _form(fault, 4) == 3 and is_installed():
+        stage.sometimes[sometimes.OLD] += 1
+        return stage.every(0.1, lambda: stage.ask_again(("reset", "enable", "resume"), _FAR_NS))
+    ahead_ns = (0, -_FAR_NS, _FAR_NS, 0)[_form(fault, 4)]
+    stage.sometimes[sometimes.OLD if ahead_ns < 0 else sometimes.AHEAD] += bool(ahead_ns)
     form, drives = layout(SLAVE_SERVO_JP, stage.robot.joint_names), stage.robot.drives
     assert drives is not None
     off = 0.05 * np.sin(np.arange(stage.robot.n) + 10.0 * fault.amount)
     place = stage.setpoint + off * drives.speed_limit
 
     def send() -> None:
-        stage.publish(SLAVE_SERVO_JP, form.encode_one(stage.platform.time_ns(), place))
+        stage.publish(SLAVE_SERVO_JP, form.encode_one(stage.platform.time_ns() + ahead_ns, place))
 
     return stage.every(0.002, send)
 
 
 def _garbage(stage: DrilledSession, fault: Fault) -> Callable[[], None]:
-    """Send bytes that are not a valid message."""
+    """Send bytes that are not a valid message, on one of several topics."""
+    topic = _READ[_form(fault, len(_READ))]
     data = bytes(int(255 * fault.amount) ^ k & 255 for k in range(int(200 * fault.amount)))
-    return stage.every(0.001, lambda: stage.publish(SLAVE_SERVO_JP, data))
+    return stage.every(0.001, lambda: stage.publish(topic, data))
 
 
 def _clutch(stage: DrilledSession, fault: Fault) -> Callable[[], None]:

@@ -174,8 +174,10 @@ def switched_on(random: Random) -> list[str]:
 
 def _lead(random: Random, state: str, at: float, slave: str) -> list[Fault]:
     """What brings an arm into a state shortly before a time [s], from whichever state."""
-    if state == State.FAULT.name:
-        return [Fault(at - random.uniform(0.05, 0.4), "press", "", random.uniform(0.1, 0.8), random.random())]
+    if state == State.FAULT.name:  # somebody tries to reset the arm while the button is held
+        begin = at - random.uniform(0.35, 0.5)
+        reset = commanded(begin + random.uniform(0.2, 0.3), "reset")
+        return [Fault(begin, "press", "", random.uniform(0.35, 0.8), random.random()), reset]
     if state == sometimes.NO_STATE:  # from the start of a new process of the slave until its first report
         dead = random.uniform(0.1, 0.5)
         return [Fault(at - dead - random.uniform(0.0, 0.4), "kill", slave, dead, 0.5)]
@@ -218,13 +220,16 @@ def search(store: Store, seed: int, seconds: float, cores: int | None = None) ->
         found, branches = waiting.popleft().result()
         return found, store.add(found, branches)
 
-    with workers(cores, warm) as pool:
-        while time.monotonic() < end:
-            if len(waiting) >= _AHEAD:
+    try:
+        with workers(cores, warm) as pool:
+            while time.monotonic() < end:
+                if len(waiting) >= _AHEAD:
+                    yield take()
+                waiting.append(pool.submit(_run_apart, chosen.choose()))
+            while waiting:
                 yield take()
-            waiting.append(pool.submit(_run_apart, chosen.choose()))
-        while waiting:
-            yield take()
+    finally:
+        store.save()
 
 
 _starts = Starts(Branches())

@@ -43,6 +43,11 @@ _CIRCLE = (
     "slave.operation.tool_speed=0.5",
     "slave.start_speed=1.0",
 )
+_HINDER = (
+    "standstill", "slow turns", "crowd", "hiccups", "loss", "delay", "disorder",
+    "slow disk", "full disk", "read-only disk", "gone disk",
+)  # fmt: skip
+"""Faults under which a killed recorder may lose more than the last messages."""
 _ROUND = 20  # schedules that are chosen together
 _STARTS = 4  # ways in which sessions start
 
@@ -232,6 +237,8 @@ class _Run:
         for process in self._stage.session.running.values():
             self._stage.killed.add(process)  # from now on the processes are ordered to end
         (first, *more), was_killed = self._stage.session.recordings, self._was("kill", "recorder")
+        ends = ((p, ns) for p, ns in self._stage.killed_ns.items() if p.name == RECORDER_NAME)
+        _, killed_ns = next(ends, (None, None))
         recorder = None if more else self._stage.session.node(RECORDER_NAME)
         self._stage.sometimes[sometimes.SEVERAL_BAGS] += bool(more)
         readers = (reader for several in self._bus.readers.values() for reader in several)
@@ -239,8 +246,13 @@ class _Run:
         outlives = self._stage.lost_disk - self._laws.lost_recorders
         self._stage.sometimes[sometimes.DISK_STAYS] += any(not one.is_dead for one in outlives)
         self._stage.session.close()
-        if not (was_killed or self._was("clock step") or self._was("clock drift")):
-            self._laws.judge_recording(first, {} if recorder is None else recorder.values())
+        with self._laws.reading():
+            if self._was("clock step") or self._was("clock drift"):
+                pass  # the times of a recording are those of the clock
+            elif not was_killed:
+                self._laws.judge_recording(first, {} if recorder is None else recorder.values())
+            elif killed_ns is not None and not any(map(self._was, _HINDER)):
+                self._laws.judge_killed(first, killed_ns)
         self._laws.finish()
         self._found.broken = tuple(self._laws.broken.values())
         self._found.looks.update(self._laws.looks)

@@ -25,8 +25,14 @@ GAVE_WAY = "a loop gives way to other programs"
 DISK_ENDS = "a recorder ends because its disk failed"
 DISK_STAYS = "a recorder outlives a failed disk"
 SEVERAL_BAGS = "a session has several recordings"
+TAPPED = "a stop button is released as soon as it is pressed"
+BESIDE = "a second client drives the arm beside the hand"
+BEYOND = "a client asks for a speed that no arm has"
+OLD = "a command is a minute old when it comes"
+AHEAD = "a command is a minute ahead of the clock"
 MOMENTS = (
     WHILE_HOMING, WHILE_BRAKING, BOTH_STOPS, UNKNOWN_STOP, AGAIN, LOST, GAVE_WAY, DISK_ENDS, DISK_STAYS, SEVERAL_BAGS,
+    TAPPED, BESIDE, BEYOND, OLD, AHEAD,
 )  # fmt: skip
 """Events of the list above."""
 

@@ -1,8 +1,13 @@
-"""Store: schedules that a search keeps, one file each, and the counts of all schedules that it ran."""
+"""Store: schedules that a search keeps, one file each, and the counts of all schedules that it ran.
+
+The counts of all schedules are written every few seconds. The counts of each later schedule are a line of another file,
+so that a search that is killed loses no schedule that has ended.
+"""
 
 import json
+import time
 from collections import Counter
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from functools import cache
 from importlib.util import find_spec
@@ -16,7 +21,9 @@ from teleop_drill.simulation.planned import VERSION, Schedule, check_version, js
 from teleop_drill.simulation.report import Coverage
 from teleop_drill.simulation.seeds import Found
 
-_COUNTS = "counts.json"
+_COUNTS, _SINCE = "counts.json", "counts_since.jsonl"
+_EVERY = 5.0
+"""Shortest time between two writings of all counts [s]."""
 _PACKAGES = ("teleop_core", "teleop_machines", "teleop_drill")
 
 
@@ -42,6 +49,7 @@ class Store:
 
     Args:
         folder: The folder; it is created if it does not exist.
+        clock: Time of a clock that never goes back [s].
 
     Raises:
         ParameterError: The folder belongs to other code or another version, or a file in it is damaged.
@@ -53,8 +61,9 @@ class Store:
         times: Number of schedules that met each event, each pair of faults in a state, and each branch.
     """
 
-    def __init__(self, folder: Path) -> None:
-        self._folder, self.coverage = folder, Coverage()
+    def __init__(self, folder: Path, clock: Callable[[], float] = time.monotonic) -> None:
+        self._folder, self.coverage, self._clock = folder, Coverage(), clock
+        self._saved, self._saved_at = 0, -_EVERY
         self.kept: list[Kept] = []
         self.times: Counter[str] = Counter()
         counts = folder / _COUNTS
@@ -77,12 +86,30 @@ class Store:
             raise ParameterError(f"code of the store {self._folder}", plain.get("code"), needed)
         try:
             self.coverage, self.times = Coverage.of(plain), Counter(dict(plain["times"]))
+            self._add_lines()
         except (AttributeError, KeyError, TypeError, ValueError) as error:
             raise ParameterError(str(counts), type(error).__name__, f"counts of schedules ({error})") from error
         for file in sorted(self._folder.glob("schedule_*.json")):
+            if file.name >= _name(self.coverage.sessions):  # killed before it was counted; it is run again
+                continue
             found = json_object(read(file), str(file))
             new, broken = (tuple(map(str, found.get(name) or ())) for name in ("new", "broken"))
             self.kept.append(Kept(Schedule.of(str(file)), new, broken, file.name))
+        if self.coverage.sessions > self._saved:
+            self.save()
+
+    def _add_lines(self) -> None:
+        """Add the counts of schedules that ended after all counts were written last."""
+        self._saved = self.coverage.sessions
+        file = self._folder / _SINCE
+        lines = read(file).splitlines(keepends=True) if file.exists() else []
+        for line in lines:
+            if not line.endswith("\n"):  # killed while it wrote
+                break
+            one = json.loads(line)
+            if one["number"] == self.coverage.sessions:
+                self.coverage.merge(Coverage.of(one))
+                self.times.update(one["times"])
 
     def add(self, found: Found, branches: Collection[str] = ()) -> tuple[str, ...]:
         """Count the result of a schedule, and keep the schedule if it met something first or broke a law.
@@ -101,11 +128,31 @@ class Store:
         self.times.update(met)
         if new or found.broken:
             schedule = Schedule(found.seed, found.faults, found.processes, found.breaks)
-            kept = Kept(schedule, new, tuple(one.law for one in found.broken), f"schedule_{number:06}.json")
+            kept = Kept(schedule, new, tuple(one.law for one in found.broken), _name(number))
             self._write(kept.file, schedule.plain() | {"new": new, "broken": kept.broken})
             self.kept.append(kept)
-        self._write(_COUNTS, {"version": VERSION} | self.coverage.plain() | {"times": dict(sorted(self.times.items()))})
+        if self._clock() - self._saved_at >= _EVERY:
+            self.save()
+        else:
+            self._append(number, found, met)
         return new
+
+    def save(self) -> None:
+        """Write all counts. A search that ends calls this; :meth:`add` calls it every few seconds."""
+        if self.coverage.sessions:
+            self._write(
+                _COUNTS, {"version": VERSION} | self.coverage.plain() | {"times": dict(sorted(self.times.items()))}
+            )
+            (self._folder / _SINCE).unlink(missing_ok=True)
+        self._saved, self._saved_at = self.coverage.sessions, self._clock()
+
+    def _append(self, number: int, found: Found, met: Collection[str]) -> None:
+        """Write the counts of a schedule as a line of its own."""
+        one = Coverage()
+        one.add(found)
+        plain = {"number": number} | one.plain() | {"sometimes": +found.sometimes, "times": sorted(met)}
+        with (self._folder / _SINCE).open("a", encoding="utf-8") as file:
+            file.write(json.dumps(plain) + "\n")
 
     def _write(self, name: str, plain: dict[str, Any]) -> None:
         text = json.dumps(plain | {"code": code_digest()}, indent=1)
@@ -117,6 +164,11 @@ class Store:
         each = ", ".join(f"{count[one]} {one}" for one in ("events", "pairs", "branches"))
         broken = [f"{one.file} breaks {', '.join(one.broken)}" for one in self.kept if one.broken]
         return [*self.coverage.lines(), f"{len(self.kept)} schedules are kept in {self._folder}: {each}", *broken]
+
+
+def _name(number: int) -> str:
+    """Name of the file of a schedule, by the number of schedules before it."""
+    return f"schedule_{number:06}.json"
 
 
 def events(found: Found) -> set[str]:
