@@ -52,6 +52,7 @@ class Found:
         faults: The faults that were injected.
         processes: Distribution of the nodes over processes.
         breaks: Share of the clock readings after which another thread of the process runs.
+        depth: As in :class:`~teleop_drill.simulation.scheduler.Scheduler`.
         broken: Breaches of laws.
         met: Number of times that each fault happened in each state of the arm.
         looks: Number of checks of each law.
@@ -65,6 +66,7 @@ class Found:
     faults: tuple[Fault, ...]
     processes: Processes = Processes.SIDES
     breaks: float = 0.0
+    depth: int = 0
     broken: tuple[Broken, ...] = ()
     met: Counter[tuple[str, str]] = field(default_factory=Counter)
     looks: Counter[str] = field(default_factory=Counter)
@@ -80,6 +82,7 @@ def run_seed(
     folder: Path | None = None,
     processes: Processes = Processes.SIDES,
     breaks: float = 0.0,
+    depth: int = 0,
 ) -> Found:
     """Run one schedule.
 
@@ -89,19 +92,19 @@ def run_seed(
         folder: Folder of the recording; None for no recording.
         processes: Distribution of the nodes over processes: by side, or all nodes except the recorder in one process.
         breaks: Share of the clock readings after which another thread of the process runs.
+        depth: As in :class:`~teleop_drill.simulation.scheduler.Scheduler`.
     """
     planned = draw(seed, PROCESSES[processes]) if faults is None else tuple(faults)
     with tempfile.TemporaryDirectory(prefix="drill_") as place:
-        machine = Machine(Scheduler(seed, breaks))
+        machine = Machine(Scheduler(seed, breaks, depth))
         bus = Bus(machine.scheduler)
+        begun = Found(seed, planned, processes, breaks, depth)
         try:
-            found: Found = machine.run(
-                lambda owner: _Run(bus, owner, Found(seed, planned, processes, breaks), folder or Path(place)).run()
-            )
+            found: Found = machine.run(lambda owner: _Run(bus, owner, begun, folder or Path(place)).run())
         except Exception as error:  # an error in one schedule must not end all others
             at = 1e-9 * (machine.scheduler.now_ns - BEGIN_NS)
             text = "".join(traceback.format_exception(error)[-2:])
-            found = Found(seed, planned, processes, breaks, (Broken("runs", at, text),), seconds=at)
+            found = Found(seed, planned, processes, breaks, depth, (Broken("runs", at, text),), seconds=at)
     return found
 
 
@@ -202,7 +205,7 @@ def shrink(found: Found, law: str) -> Found:
     while size > 0:
         for begin in range(0, len(best.faults), size):
             fewer = best.faults[:begin] + best.faults[begin + size :]
-            again = run_seed(found.seed, fewer, None, found.processes, found.breaks)
+            again = run_seed(found.seed, fewer, None, found.processes, found.breaks, found.depth)
             if any(one.law == law for one in again.broken):
                 best, size = again, min(size, len(again.faults))
                 break
