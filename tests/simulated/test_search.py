@@ -73,7 +73,9 @@ class Thing:
 def met(schedule: Schedule, **counts: int) -> Found:
     """A result of a schedule that met events so often."""
     seen = Counter({name.replace("_", " "): count for name, count in counts.items()})
-    return Found(schedule.seed, schedule.faults, schedule.processes, schedule.breaks, schedule.depth, sometimes=seen)
+    found = Found(schedule.seed, schedule.faults, schedule.processes, schedule.breaks, schedule.depth, schedule.session)
+    found.sometimes = seen
+    return found
 
 
 def chosen(store: Store, count: int, seed: int = 7) -> list[Schedule]:
@@ -124,7 +126,7 @@ def test_branches_that_ran_are_named_by_line_and_side_and_marks_change_no_result
 
 
 def test_a_schedule_is_the_same_after_it_was_written_and_read(tmp_path: Path) -> None:
-    schedule = Schedule(11, draw(11, PROCESSES[Processes.ONE]), Processes.ONE, 0.0005, 3)
+    schedule = Schedule(11, draw(11, PROCESSES[Processes.ONE]), Processes.ONE, 0.0005, 3, "person")
     text = json.dumps(schedule.plain())
     (tmp_path / "one.json").write_text(text, encoding="utf-8")
     assert Schedule.of(text) == schedule
@@ -141,6 +143,7 @@ def test_a_schedule_is_the_same_after_it_was_written_and_read(tmp_path: Path) ->
         ({"nodes": "nodes"}, "of sides, one"),
         ({"breaks": 1.0}, "from 0 to 0.1"),
         ({"depth": 10}, "depth of the schedule is 10, must be an integer from 0 to 9"),
+        ({"session": "opera"}, "session of the schedule is 'opera', must be of plain, visited"),
         ({"depth": True}, "an integer from 0 to 9"),
         ({"faults": None}, "a list"),
         ({"faults": [[1.0, "press", "", 0.5]]}, "[begin, kind, process, duration, amount]"),

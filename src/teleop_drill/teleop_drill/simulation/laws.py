@@ -173,6 +173,7 @@ class Laws:
             self._cells = None if self._led is None else Cells(self._led.state)
         cells = self._cells
         is_driven = cells is not None and not cells["is_busy"] and cells["motion"] != _FOLLOWING
+        is_driven = is_driven and cells["driven_ns"] > 0  # an arm that is told to hold is not driven
         if wrong := self._owner.judge(process, stamp_ns, is_driven=is_driven):
             self._break("owner", wrong)
         self._stage.commanded_ns = self._owner.followed_ns

@@ -10,6 +10,7 @@ from teleop_core.base.errors import ParameterError, RecordingError
 from teleop_core.nodes.crews import Processes
 from teleop_drill.simulation.schedules import KINDS, OF_PROCESS, Fault
 from teleop_drill.simulation.seeds import PROCESSES, Found, run_seed
+from teleop_drill.simulation.visits import PLAIN, SESSIONS
 
 VERSION = 2
 """Version of the form of a schedule."""
@@ -31,6 +32,7 @@ class Schedule:
         processes: Distribution of the nodes over processes.
         breaks: As in :func:`~teleop_drill.simulation.seeds.run_seed`.
         depth: As in :class:`~teleop_drill.simulation.scheduler.Scheduler`.
+        session: Kind of session, one of :data:`~teleop_drill.simulation.visits.SESSIONS`.
     """
 
     seed: int
@@ -38,15 +40,16 @@ class Schedule:
     processes: Processes = Processes.SIDES
     breaks: float = 0.0
     depth: int = 0
+    session: str = PLAIN
 
     @classmethod
     def of_found(cls, found: Found) -> "Schedule":
         """Schedule that had a result."""
-        return cls(found.seed, found.faults, found.processes, found.breaks, found.depth)
+        return cls(found.seed, found.faults, found.processes, found.breaks, found.depth, found.session)
 
     def run(self, folder: Path | None = None) -> Found:
         """Run the schedule; the recording is kept in a folder if one is given."""
-        return run_seed(self.seed, self.faults, folder, self.processes, self.breaks, self.depth)
+        return run_seed(self.seed, self.faults, folder, self.processes, self.breaks, self.depth, self.session)
 
     def plain(self) -> dict[str, Any]:
         """Plain values for JSON."""
@@ -56,6 +59,7 @@ class Schedule:
             "nodes": self.processes.value,
             "breaks": self.breaks,
             "depth": self.depth,
+            "session": self.session,
             "faults": [[one.at, one.kind, one.where, one.seconds, one.amount] for one in self.faults],
         }
 
@@ -78,8 +82,8 @@ class Schedule:
     @classmethod
     def _of_plain(cls, plain: dict[str, Any]) -> "Schedule":
         check_version(plain, "the schedule")
-        values: list[Any] = [plain.get(name) for name in ("seed", "nodes", "breaks", "depth")]
-        seed, nodes, breaks, depth = values
+        values: list[Any] = [plain.get(name) for name in ("seed", "nodes", "breaks", "depth", "session")]
+        seed, nodes, breaks, depth, session = values
         if isinstance(seed, bool) or not isinstance(seed, int):
             raise ParameterError("seed of the schedule", seed, "an integer")
         if nodes not in [one.value for one in PROCESSES]:
@@ -88,10 +92,12 @@ class Schedule:
             raise ParameterError("breaks of the schedule", breaks, "from 0 to 0.1")
         if isinstance(depth, bool) or depth not in range(DEPTHS + 1):
             raise ParameterError("depth of the schedule", depth, f"an integer from 0 to {DEPTHS}")
+        if not isinstance(session, str) or session not in SESSIONS:
+            raise ParameterError("session of the schedule", session, f"of {', '.join(SESSIONS)}")
         faults, processes = plain.get("faults"), Processes(nodes)
         if not isinstance(faults, list) or len(faults) > _MOST:
             raise ParameterError("faults of the schedule", faults, f"a list of at most {_MOST}")
-        return cls(seed, tuple(_fault(one, processes) for one in faults), processes, breaks, depth)
+        return cls(seed, tuple(_fault(one, processes) for one in faults), processes, breaks, depth, session)
 
 
 def _fault(values: object, processes: Processes) -> Fault:

@@ -24,6 +24,7 @@ from teleop_drill.simulation.planned import Schedule
 from teleop_drill.simulation.schedules import BEGIN, END, KINDS, OF_PROCESS, Fault, commanded
 from teleop_drill.simulation.seeds import PROCESSES, Found, warm
 from teleop_drill.simulation.store import Store, code_digest
+from teleop_drill.simulation.visits import PLAIN, SESSIONS
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -38,6 +39,8 @@ _AHEAD_OF_CLUSTER = 32
 _BREAKS = 0.0005
 _DEEP, _DEPTHS = 0.25, (1, 2, 2, 3, 4)
 """Share of schedules in which priorities of threads decide, and the depths of these."""
+_PLAIN = 0.4
+"""Share of schedules with the plain session at least; the others draw from all kinds."""
 _LEADS = {
     State.DISABLED.name: ("reset", "disable"),
     State.ENABLED.name: ("reset", "enable", "resume"),
@@ -89,7 +92,7 @@ class Search:
         kinds = switched_on(random)
         faults = [one for _ in range(random.randint(2, 8)) for one in self._aimed(random, kinds, processes)]
         breaks = _BREAKS if random.random() < 0.2 else 0.0
-        return Schedule(seed, _tidy(random, faults), processes, breaks, _depth(random))
+        return Schedule(seed, _tidy(random, faults), processes, breaks, _depth(random), _session(random))
 
     def _aimed(self, random: Random, kinds: Sequence[str], processes: Processes) -> list[Fault]:
         """A fault in a state of the arm, and what brings the arm there."""
@@ -124,7 +127,8 @@ class Search:
             faults = change(random, faults, parent.processes) or faults
         seed = random.choice((seed, parent.seed))
         depth = parent.depth if random.random() < 0.8 else _depth(random)
-        return replace(parent, seed=seed, faults=_tidy(random, faults), depth=depth)
+        session = parent.session if random.random() < 0.8 else _session(random)
+        return replace(parent, seed=seed, faults=_tidy(random, faults), depth=depth, session=session)
 
     def _parent(self, random: Random) -> Schedule:
         """A kept schedule; one with rare events and few children has the largest weight."""
@@ -180,6 +184,10 @@ class Search:
 
 def _depth(random: Random) -> int:
     return random.choice(_DEPTHS) if random.random() < _DEEP else 0
+
+
+def _session(random: Random) -> str:
+    return PLAIN if random.random() < _PLAIN else random.choice(sorted(SESSIONS))
 
 
 def switched_on(random: Random) -> list[str]:

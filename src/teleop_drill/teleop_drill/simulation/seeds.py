@@ -15,6 +15,7 @@ from teleop_core.graph.operation import State
 from teleop_core.nodes.crews import Processes
 from teleop_core.nodes.start import SESSION
 from teleop_core.session import api
+from teleop_core.session.configuration import Configuration
 from teleop_drill.drill import hand
 from teleop_drill.drill.numbers import Numbers
 from teleop_drill.simulation import sometimes
@@ -22,9 +23,11 @@ from teleop_drill.simulation.bus import Bus
 from teleop_drill.simulation.drilled_session import DrilledSession
 from teleop_drill.simulation.laws import Broken, Laws
 from teleop_drill.simulation.machine import Machine, Process
+from teleop_drill.simulation.platform import SimulatedPlatform
 from teleop_drill.simulation.reach import BEGIN_NS
 from teleop_drill.simulation.scheduler import Scheduler
 from teleop_drill.simulation.schedules import KINDS, Fault, draw
+from teleop_drill.simulation.visits import PLAIN, SESSIONS, Visitor
 
 PROCESSES = {Processes.SIDES: ("hand_side", "slave_side", RECORDER_NAME), Processes.ONE: (SESSION, RECORDER_NAME)}
 """Processes that a schedule may affect, by the distribution of the nodes."""
@@ -53,6 +56,7 @@ class Found:
         processes: Distribution of the nodes over processes.
         breaks: Share of the clock readings after which another thread of the process runs.
         depth: As in :class:`~teleop_drill.simulation.scheduler.Scheduler`.
+        session: Name of the kind of session, as in :data:`~teleop_drill.simulation.visits.SESSIONS`.
         broken: Breaches of laws.
         met: Number of times that each fault happened in each state of the arm.
         looks: Number of checks of each law.
@@ -67,6 +71,7 @@ class Found:
     processes: Processes = Processes.SIDES
     breaks: float = 0.0
     depth: int = 0
+    session: str = PLAIN
     broken: tuple[Broken, ...] = ()
     met: Counter[tuple[str, str]] = field(default_factory=Counter)
     looks: Counter[str] = field(default_factory=Counter)
@@ -83,6 +88,7 @@ def run_seed(
     processes: Processes = Processes.SIDES,
     breaks: float = 0.0,
     depth: int = 0,
+    session: str = PLAIN,
 ) -> Found:
     """Run one schedule.
 
@@ -93,18 +99,19 @@ def run_seed(
         processes: Distribution of the nodes over processes: by side, or all nodes except the recorder in one process.
         breaks: Share of the clock readings after which another thread of the process runs.
         depth: As in :class:`~teleop_drill.simulation.scheduler.Scheduler`.
+        session: As in :class:`Found`.
     """
     planned = draw(seed, PROCESSES[processes]) if faults is None else tuple(faults)
     with tempfile.TemporaryDirectory(prefix="drill_") as place:
         machine = Machine(Scheduler(seed, breaks, depth))
         bus = Bus(machine.scheduler)
-        begun = Found(seed, planned, processes, breaks, depth)
+        begun = Found(seed, planned, processes, breaks, depth, session)
         try:
             found: Found = machine.run(lambda owner: _Run(bus, owner, begun, folder or Path(place)).run())
         except Exception as error:  # an error in one schedule must not end all others
             at = 1e-9 * (machine.scheduler.now_ns - BEGIN_NS)
             text = "".join(traceback.format_exception(error)[-2:])
-            found = Found(seed, planned, processes, breaks, depth, (Broken("runs", at, text),), seconds=at)
+            found = Found(seed, planned, processes, breaks, depth, session, (Broken("runs", at, text),), seconds=at)
     return found
 
 
@@ -114,12 +121,17 @@ class _Run:
     def __init__(self, bus: Bus, owner: Process, found: Found, folder: Path) -> None:
         bus.watch(owner)
         self._bus = bus
-        made = api.configuration("free_motion", texts=(*_CIRCLE, "real_time.priority=20"))
+        kind = SESSIONS[found.session]
+        texts = (*(_CIRCLE if kind.has_circle else ()), "real_time.priority=20", *kind.texts)
+        made = api.configuration(kind.scenario, texts=texts)
         numbers = Numbers.of(made)
         self._found, self._scheduler = found, owner.machine.scheduler
         self._stage = DrilledSession(bus, owner, made, numbers.robot, folder, found.processes)
         self._laws = Laws(self._stage, numbers)
         self._ends: list[Callable[[], None]] = []
+        self._visitor: Visitor | None = None
+        if kind.is_visited:
+            self._visit(made)
 
     def run(self) -> Found:
         """Run the schedule."""
@@ -127,11 +139,15 @@ class _Run:
         self._stage.session.start()
         self._laws.judge_recovery(self._await(_START), _START)
         self._laws.begin_ns = self._scheduler.now_ns
+        if self._visitor is not None:
+            self._visitor.may_act = True
         for fault in self._found.faults:
             at_ns = self._laws.begin_ns + round(1e9 * fault.at)
             self._scheduler.at(at_ns, partial(self._begin, fault))
         last = max((fault.at + fault.seconds for fault in self._found.faults), default=0.0)
         self._wait(last + 0.5)
+        if self._visitor is not None:
+            self._visitor.may_act = False
         for end in self._ends:
             end()
         self._stage.command(sometimes.RELEASE)
@@ -150,13 +166,22 @@ class _Run:
         outlives = self._stage.lost_disk - self._laws.lost_recorders
         self._stage.sometimes[sometimes.DISK_STAYS] += any(not one.is_dead for one in outlives)
         self._stage.session.close()
-        if not (was_killed or self._was("clock step") or self._was("clock drift")):
+        if not (was_killed or self._visitor or self._was("clock step") or self._was("clock drift")):
             self._laws.judge_recording(first, {} if recorder is None else recorder.values())
         self._found.broken = tuple(self._laws.broken.values())
         self._found.looks.update(self._laws.looks)
         self._found.under.update(self._laws.under)
         self._found.sometimes.update(self._stage.sometimes)
         return self._found
+
+    def _visit(self, made: Configuration) -> None:
+        """Start the program that uses the session."""
+
+        def work(process: Process) -> int:
+            self._visitor = Visitor(SimulatedPlatform(self._bus, process), made)
+            return self._visitor.run()
+
+        self._bus.watch(self._stage.machine.start("visitor", work))
 
     def _begin(self, fault: Fault) -> None:
         state, seen = self._stage.state, self._stage.sometimes
@@ -205,7 +230,7 @@ def shrink(found: Found, law: str) -> Found:
     while size > 0:
         for begin in range(0, len(best.faults), size):
             fewer = best.faults[:begin] + best.faults[begin + size :]
-            again = run_seed(found.seed, fewer, None, found.processes, found.breaks, found.depth)
+            again = run_seed(found.seed, fewer, None, found.processes, found.breaks, found.depth, found.session)
             if any(one.law == law for one in again.broken):
                 best, size = again, min(size, len(again.faults))
                 break
