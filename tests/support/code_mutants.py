@@ -145,7 +145,7 @@ CODE_MUTANTS = (
     _mutant("workers_forget", "a worker forgets the parts that it has of its own", "teleop_lab/studies/workers.py",
             "return [*own, *(", "return [*(", "studies"),
     _mutant("late_other_code", "a worker that comes later with other code is not noticed",
-            "teleop_lab/studies/workers.py", "if code_digest() != code:", "if False:", "studies"),
+            "base/cluster.py", "if digest() != code:", "if False:", "studies"),
     _mutant("worst_is_best", "a search takes the worst values for the best", "teleop_lab/studies/tuning.py",
             "max(means) if is_largest else min(means)", "max(means)", "tuning"),
     _mutant("goal_chased", "a goal that jumps is run after as one that moves", "hand/operators/glances.py",
@@ -950,6 +950,15 @@ CODE_MUTANTS = (
     _mutant("block_alone", "steps between setpoints that are not judged together are not judged",
             "teleop_drill/simulation/steps.py", "        if self._last is not None:", "        if False:",
             "tests/unit/test_steps.py"),
+    _mutant("visitor_idle", "no client, display or supervisor uses a visited session",
+            "teleop_drill/simulation/visits.py", "            if self.may_act and", "            if False and",
+            "tests/simulated/test_seeds.py"),
+    _mutant("unranked", "threads wait for their interpreter without priorities", "teleop_drill/simulation/scheduler.py",
+            "            rank = what.rank\n", "            rank = 0.0\n", "tests/simulated/test_machine.py"),
+    _mutant("rank_kept", "priorities of threads never change", "teleop_drill/simulation/scheduler.py",
+            "what.rank = float(len(self._changes))", "pass", "tests/simulated/test_machine.py"),
+    _mutant("starved", "a thread of low priority waits without end", "teleop_drill/simulation/scheduler.py",
+            "what.waits_ns > _FAIR_NS)", "what.waits_ns > 10**12)", "tests/simulated/test_machine.py"),
 )  # fmt: skip
 """All of them."""
 

@@ -197,6 +197,7 @@ class Laws:
         self._count("owner")
         cells = self._cells
         is_driven = cells is not None and not cells["is_busy"] and cells["motion"] != _FOLLOWING
+        is_driven = is_driven and cells["driven_ns"] > 0  # an arm that is told to hold is not driven
         if wrong := self._owner.judge(process, stamp_ns, is_driven=is_driven):
             self._break("owner", wrong)
         age_ns = self._scheduler.now_ns - self._stage.driven_ns
