@@ -71,6 +71,8 @@ class Bus:
         """Observers of the messages of a topic when they are sent, by the full name of the topic."""
         self.heard: dict[str, Callable[[Reader, Taken], None]] = {}
         """Observers of the messages of a topic when readers take them, by the full name of the topic."""
+        self.called: dict[str, Callable[[], None]] = {}
+        """Observers of the requests to a service when they are sent, by the full name of the service."""
         self.reaches = bool(functions()) and not scheduler.breaks
         """Whether kernels take and publish themselves; Python code does it where threads are interrupted."""
         self._plain = Line()

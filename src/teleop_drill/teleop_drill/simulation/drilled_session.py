@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -105,6 +106,8 @@ class DrilledSession:
         """Time at which a setpoint last followed a new command [ns]."""
         bus.seen[f"/{SLAVE_OPERATION.name}"] = self._note_operation
         bus.seen[f"/{TELEOP_STATE.name}"] = self._note_state
+        bus.called |= {f"/slave/{name}": partial(self.asked.append, name) for name in names}
+        bus.seen["/slave/state_command"] = self._note_command
 
     def _spin(self) -> None:
         while True:
@@ -119,6 +122,10 @@ class DrilledSession:
                 self.sometimes[sometimes.change(State(int(before)), State(int(told["state"])))] += 1
             if fault := int(told["fault"]):
                 self.sometimes[f"fault {SlaveFault(fault).word}"] += 1
+
+    def _note_command(self, taken: Taken) -> None:
+        """Note a command of CRTK, which is the last text of its message."""
+        self.asked.append(taken.data.rstrip(b"\0").rpartition(b"\0")[2].decode("utf-8", "replace"))
 
     def _note_state(self, taken: Taken) -> None:
         found = read_numbers(taken.data, TELEOP_STATE.columns)
@@ -185,7 +192,6 @@ class DrilledSession:
     def command(self, name: str) -> None:
         """Send a request to the slave without waiting for the answer."""
         self.sometimes[sometimes.asked(name, self.state)] += 1
-        self.asked.append(name)
         self._clients[name].call_async(Trigger.Request())
 
     def lead(self, *, by_hand: bool) -> None:

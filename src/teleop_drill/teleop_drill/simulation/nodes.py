@@ -157,6 +157,8 @@ class Client:
         service = bus.services.get(self.srv_name)
         if service is None:
             return answer
+        if self.srv_name in bus.called:
+            bus.called[self.srv_name]()
 
         def reply(response: Any) -> None:
             bus.call(service.process, own, lambda: self._node.post(lambda: answer.set(response)))
