@@ -3,13 +3,14 @@
     python benchmarks/simulated.py --count 20            # the median of 20 random schedules, by side and composed
     python benchmarks/simulated.py --count 1 --parts     # one schedule of each, with the share of each part
 
-The first schedule of a process loads the kernels and is not counted. ``--parts`` looks at the running code once in a
-millisecond of processor time, first by kind of work, then by function.
+Schedules share the starts of their sessions, as those of ``teleop drill --seeds`` and ``--search`` do; the starts and
+what loads the kernels are not counted. ``--alone`` starts a session for each schedule. ``--parts`` does so too, and
+looks at the running code once in a millisecond of processor time, first by kind of work, then by function.
 """
 
 import argparse
+import resource
 import signal
-import time
 from collections import Counter
 from contextlib import nullcontext
 from pathlib import Path
@@ -18,7 +19,7 @@ from types import FrameType
 import numpy as np
 
 from teleop_core.nodes.crews import Processes
-from teleop_drill.simulation.seeds import run_seed
+from teleop_drill.simulation.seeds import STARTS, Starts, run_seed
 
 _PARTS = 30  # parts that are listed
 _SAMPLE = 1e-3  # processor time between two samples [s]
@@ -43,14 +44,23 @@ KINDS = {
 """Modules of each kind of work, by the begins of their names; the first kind that fits counts."""
 
 
-def speeds(first: int, count: int, processes: Processes) -> list[float]:
-    """Simulated seconds in each second of processor time, of each schedule."""
+def speeds(first: int, count: int, processes: Processes, starts: Starts | None) -> list[tuple[float, float]]:
+    """Simulated seconds in each second of processor time, and processor time [s], of each schedule."""
     found = []
     for seed in range(first, first + count):
-        begin = time.process_time()
-        seconds = run_seed(seed, processes=processes).seconds
-        found.append(seconds / (time.process_time() - begin))
+        begin = used_s()
+        if starts is None:
+            seconds = run_seed(seed, processes=processes).seconds
+        else:
+            seconds = starts.run(seed, None, processes)[0].seconds
+        took = used_s() - begin
+        found.append((seconds / took, took))
     return found
+
+
+def used_s() -> float:
+    """Processor time of this process and of its copies that have ended [s]."""
+    return sum(sum(resource.getrusage(who)[:2]) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
 
 
 class Sampler:
@@ -93,14 +103,20 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0, help="first seed")
     parser.add_argument("--count", type=int, default=5, help="schedules of each distribution of the nodes")
     parser.add_argument("--parts", action="store_true", help="print the share of each part in the processor time")
+    parser.add_argument("--alone", action="store_true", help="start a session for each schedule")
     given = parser.parse_args()
     for processes in (Processes.SIDES, Processes.ONE):
         run_seed(given.seed, (), processes=processes)
+        starts = None if given.parts or given.alone else Starts()
+        if starts is not None:
+            for seed in range(given.seed, given.seed + STARTS):
+                starts.run(seed, (), processes)
         with Sampler() if given.parts else nullcontext() as sampler:
-            found = speeds(given.seed, given.count, processes)
-        low, middle, high = np.percentile(found, [25, 50, 75])
+            found = speeds(given.seed, given.count, processes, starts)
+        low, middle, high = np.percentile([speed for speed, _ in found], [25, 50, 75])
+        took = np.median([took for _, took in found])
         text = f"{processes.value}: {middle:.2f} simulated s per processor s, quartiles {low:.2f} to {high:.2f}"
-        print(text, flush=True)
+        print(f"{text}; {took:.2f} processor s each", flush=True)
         for counts in (sampler.counts, sampler.places) if sampler is not None else ():
             for name, count in counts.most_common(_PARTS):
                 share = count / counts.total()

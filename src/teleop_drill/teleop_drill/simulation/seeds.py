@@ -53,7 +53,8 @@ _HINDER = (
 )  # fmt: skip
 """Faults under which a killed recorder may lose more than the last messages."""
 _ROUND = 20  # schedules that are chosen together
-_STARTS = 4  # ways in which sessions start
+STARTS = 4
+"""Number of ways in which sessions start."""
 
 
 @dataclass
@@ -102,7 +103,7 @@ def run_seed(
 ) -> Found:
     """Run one schedule.
 
-    A session starts in one of :data:`_STARTS` ways, which the seed chooses. Then the seed itself gives all random
+    A session starts in one of :data:`STARTS` ways, which the seed chooses. Then the seed itself gives all random
     numbers. So schedules can share a start, see :class:`Starts`.
 
     Args:
@@ -131,7 +132,7 @@ class _Start(NamedTuple):
     def of(cls, seed: int, processes: Processes, breaks: float, session: str) -> "_Start":
         """Start of a schedule; sessions of rare kinds have one start, because each that waits takes memory."""
         is_frequent = session == PLAIN and not breaks
-        return cls(seed % _STARTS if is_frequent else 0, processes, breaks, session)
+        return cls(seed % STARTS if is_frequent else 0, processes, breaks, session)
 
 
 @contextmanager
