@@ -210,6 +210,10 @@ class Laws:
             self._last = None
             return
         q = self._form.decode(rows)[1][:, : self._stage.robot.n]
+        if not np.isfinite(q).all():
+            self._break("speed", "a setpoint is not a number")
+            self._last = None
+            return
         tips = self._stage.robot.fk(q)[:, :3, 3]
         self._stage.setpoint = q[-1]
         if self._last is not None:
@@ -381,7 +385,7 @@ class Laws:
             self._obey_by = self._worked + (_OBEY if is_sent else _DOUBT)
             self._changes.hold(button, self._obey_by)
         is_over = not is_sent and self._was_idle and button not in stage.held
-        if is_over or operation["is_stopped"] or operation["is_pressed"]:
+        if is_over or operation["is_stopped"]:
             self._press = None
         elif self._worked > self._obey_by + self._late():
             self._press = None
