@@ -22,7 +22,7 @@ setup(
         "pyyaml",
         "rich",
     ],
-    extras_require={"ros": ["teleop_core[ros]"]},
+    extras_require={"dask": ["distributed"], "ros": ["teleop_core[ros]"]},
     data_files=[
         ("share/ament_index/resource_index/packages", ["resource/teleop_drill"]),
         ("share/teleop_drill", ["package.xml"]),

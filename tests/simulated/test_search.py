@@ -8,13 +8,15 @@ import subprocess
 import sys
 from collections import Counter
 from importlib import import_module
+from itertools import islice
 from pathlib import Path
 from random import Random
 from typing import Any
 
 import pytest
 
-from teleop_core.base.errors import ParameterError, RecordingError
+from cluster import cluster
+from teleop_core.base.errors import ParameterError, RecordingError, SessionError
 from teleop_core.nodes.crews import Processes
 from teleop_core.nodes.operation import StopInput
 from teleop_drill.simulation import sometimes
@@ -22,7 +24,7 @@ from teleop_drill.simulation.branches import Branches
 from teleop_drill.simulation.laws import Broken
 from teleop_drill.simulation.planned import Schedule
 from teleop_drill.simulation.schedules import END, KINDS, OF_PROCESS, draw
-from teleop_drill.simulation.search import Search, switched_on
+from teleop_drill.simulation.search import Search, search, switched_on
 from teleop_drill.simulation.seeds import PROCESSES, Found
 from teleop_drill.simulation.store import Store, kind_of
 
@@ -72,7 +74,9 @@ class Thing:
 def met(schedule: Schedule, **counts: int) -> Found:
     """A result of a schedule that met events so often."""
     seen = Counter({name.replace("_", " "): count for name, count in counts.items()})
-    return Found(schedule.seed, schedule.faults, schedule.processes, schedule.breaks, sometimes=seen)
+    found = Found(schedule.seed, schedule.faults, schedule.processes, schedule.breaks, schedule.depth, schedule.session)
+    found.sometimes = seen
+    return found
 
 
 def chosen(store: Store, count: int, seed: int = 7) -> list[Schedule]:
@@ -123,7 +127,7 @@ def test_branches_that_ran_are_named_by_line_and_side_and_marks_change_no_result
 
 
 def test_a_schedule_is_the_same_after_it_was_written_and_read(tmp_path: Path) -> None:
-    schedule = Schedule(11, draw(11, PROCESSES[Processes.ONE]), Processes.ONE, 0.0005)
+    schedule = Schedule(11, draw(11, PROCESSES[Processes.ONE]), Processes.ONE, 0.0005, 3, "person")
     text = json.dumps(schedule.plain())
     (tmp_path / "one.json").write_text(text, encoding="utf-8")
     assert Schedule.of(text) == schedule
@@ -134,11 +138,14 @@ def test_a_schedule_is_the_same_after_it_was_written_and_read(tmp_path: Path) ->
 @pytest.mark.parametrize(
     ("change", "needed"),
     [
-        ({"version": 2}, "version of the schedule is 2, must be 1"),
+        ({"version": 1}, "version of the schedule is 1, must be 2"),
         ({"seed": "today"}, "seed of the schedule is 'today', must be an integer"),
         ({"seed": True}, "an integer"),
         ({"nodes": "nodes"}, "of sides, one"),
         ({"breaks": 1.0}, "from 0 to 0.1"),
+        ({"depth": 10}, "depth of the schedule is 10, must be an integer from 0 to 9"),
+        ({"session": "opera"}, "session of the schedule is 'opera', must be of plain, visited"),
+        ({"depth": True}, "an integer from 0 to 9"),
         ({"faults": None}, "a list"),
         ({"faults": [[1.0, "press", "", 0.5]]}, "[begin, kind, process, duration, amount]"),
         ({"faults": [[1.0, "storm", "", 0.5, 0.5]]}, "of buttons, clock drift"),
@@ -273,6 +280,12 @@ def test_about_half_of_the_kinds_are_off_in_a_schedule_and_all_come_in_many(tmp_
     assert {one.kind for _ in range(60) for one in search.choose().faults} == set(KINDS)
 
 
+def test_priorities_of_threads_decide_in_a_part_of_the_schedules(tmp_path: Path) -> None:
+    depths = Counter(schedule.depth for schedule in chosen(Store(tmp_path), 100))
+    assert 10 < 100 - depths[0] < 50
+    assert {0, 1, 2, 3} <= set(depths)
+
+
 def test_what_was_never_met_is_aimed_at_more_often(tmp_path: Path) -> None:
     store = Store(tmp_path)
     known = [sometimes.met(kind, state) for kind in KINDS for state in sometimes.STATES if kind != "garbage"]
@@ -323,6 +336,25 @@ def test_a_schedule_whose_branches_are_marked_has_the_same_bytes(tmp_path: Path)
     )
     assert plain
     assert plain == marked
+
+
+@pytest.mark.slow
+def test_a_cluster_gives_the_schedules_and_results_of_this_machine_and_refuses_other_code(tmp_path: Path) -> None:
+    """The third schedule is chosen when the first result is known."""
+    stores = [Store(tmp_path / name) for name in ("here", "there")]
+    here = list(islice(search(stores[0], 5, 1e3, 1, ahead=2), 3))
+
+    def have_other_code() -> None:  # in here it travels as a value
+        from teleop_drill.simulation import store
+
+        vars(store)["code_digest"] = lambda: "other"
+
+    with cluster(tmp_path / "dask") as client:
+        assert list(islice(search(stores[1], 5, 1e3, client=client, ahead=2), 3)) == here
+        assert stores[0].kept == stores[1].kept
+        client.run(have_other_code)
+        with pytest.raises(SessionError, match="has code other, must be ours"):
+            next(search(stores[1], 5, 1e3, client=client))
 
 
 @pytest.mark.soak

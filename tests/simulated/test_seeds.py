@@ -6,21 +6,23 @@ import shlex
 import subprocess
 import sys
 from collections import Counter
-from functools import partial
+from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from teleop_core.base.workers import apart
 from teleop_core.graph.operation import State
 from teleop_core.nodes.crews import Processes
 from teleop_core.nodes.operation import StopInput
 from teleop_drill.simulation import seeds, sometimes
+from teleop_drill.simulation.branches import Branches
 from teleop_drill.simulation.planned import Schedule
 from teleop_drill.simulation.report import told
 from teleop_drill.simulation.schedules import KINDS, Fault, draw
-from teleop_drill.simulation.seeds import PROCESSES, run_seed, shrink
+from teleop_drill.simulation.seeds import PROCESSES, Starts, run_seed, shrink
+from teleop_drill.simulation.visits import PLAIN, SESSIONS
 
 pytestmark = pytest.mark.slow
 SIDES = PROCESSES[Processes.SIDES]
@@ -136,7 +138,43 @@ def test_a_seed_is_known_once_each_of_its_faults_has_met_every_state() -> None:
     assert seeds._known(30, met, Processes.SIDES) >= 1.0
 
 
-def test_a_schedule_has_the_same_result_first_in_a_process_and_in_a_copy_of_it() -> None:
-    faults = [Fault(1.0, "command", "", 0.1, 0.28), Fault(1.2, "kill", "slave_side", 0.3, 0.5)]
-    copied = [apart(partial(run_seed, 4, faults)) for _ in range(2)]
-    assert copied == 2 * [run_seed(4, faults)]
+def test_a_schedule_has_the_same_result_alone_and_after_the_start_of_another_one() -> None:
+    faults = [
+        (Fault(0.5, "command", "", 0.1, 0.28), Fault(0.7, "kill", "slave_side", 0.3, 0.5)),
+        (Fault(0.2, "full disk", "", 0.5, 0.5), Fault(0.7, "loss", "hand_side", 0.3, 0.5)),
+    ]
+    with closing(Starts()) as starts:
+        shared = [starts.run(4 + 4 * k, one, Processes.SIDES, 0.0)[0] for k, one in enumerate((*faults, *faults))]
+    assert shared == [run_seed(4 + 4 * k, one) for k, one in enumerate((*faults, *faults))]
+    assert [found.looks["recorded"] for found in shared] == [1, 1, 1, 1]
+    assert not any(found.broken for found in shared)
+    assert shared[0] != shared[2]  # the same start and the same faults, but another seed
+
+
+def test_a_recording_has_the_same_bytes_in_whichever_folder_it_lies(tmp_path: Path) -> None:
+    files = []
+    for folder in (tmp_path / "a", tmp_path / "a longer name" / "in another folder"):
+        run_seed(5, (), folder)
+        files.append((folder / "recording_1" / "recording_1_0.mcap").read_bytes())
+    assert files[0] == files[1]
+
+
+@pytest.mark.parametrize("session", SESSIONS)
+def test_all_laws_hold_in_each_kind_of_session_and_all_but_the_plain_one_are_visited(session: str) -> None:
+    with closing(Starts(Branches())) as starts:
+        found, branches = Schedule(3, draw(3, SIDES)[:2], session=session).run_in(starts)
+    assert found.broken == ()
+    is_visited = any("remote_control" in name for name in branches)  # the visitor stops the arms now and then
+    assert is_visited is (session != PLAIN)
+
+
+def test_a_visited_schedule_has_the_same_result_again() -> None:
+    schedule = Schedule(8, draw(8, SIDES)[:1], session="visited")
+    with closing(Starts()) as starts:
+        assert schedule.run_in(starts)[0] == schedule.run()
+
+
+def test_a_schedule_in_which_priorities_decide_has_the_same_result_again() -> None:
+    schedule = Schedule(8, draw(8, SIDES)[:1], depth=3)
+    with closing(Starts()) as starts:
+        assert schedule.run_in(starts)[0] == schedule.run() != replace(schedule, depth=2).run()

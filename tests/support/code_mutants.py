@@ -46,6 +46,7 @@ _SPHERICAL_WRIST = "kinematics/closed_form/spherical_wrist.py"
 _PARALLEL_AXES = "kinematics/closed_form/parallel_axes.py"
 _CANDIDATES = "kinematics/closed_form/candidates.py"
 _SEEING = "hand/operators/observer.py"
+_SEEDS = "tests/simulated/test_seeds.py"
 CODE_MUTANTS = (
     _mutant("joints_overlap", "arrays over joints of a record begin at one place", "kernels/compiler/joint_records.py",
             "        begin = builder.add(begin, _bytes(builder, sizes))\n", "        pass\n", "joint_records"),
@@ -144,7 +145,7 @@ CODE_MUTANTS = (
     _mutant("workers_forget", "a worker forgets the parts that it has of its own", "teleop_lab/studies/workers.py",
             "return [*own, *(", "return [*(", "studies"),
     _mutant("late_other_code", "a worker that comes later with other code is not noticed",
-            "teleop_lab/studies/workers.py", "if code_digest() != code:", "if False:", "studies"),
+            "base/cluster.py", "if digest() != code:", "if False:", "studies"),
     _mutant("worst_is_best", "a search takes the worst values for the best", "teleop_lab/studies/tuning.py",
             "max(means) if is_largest else min(means)", "max(means)", "tuning"),
     _mutant("goal_chased", "a goal that jumps is run after as one that moves", "hand/operators/glances.py",
@@ -940,6 +941,24 @@ CODE_MUTANTS = (
             'if plain.get("code") != code_digest():', "if False:", "tests/simulated/test_search.py"),
     _mutant("breach_lost", "a schedule that broke a law is not kept", "teleop_drill/simulation/store.py",
             "        if new or found.broken:", "        if new:", "tests/simulated/test_search.py"),
+    _mutant("files_shared", "schedules that share a start write into the same file", "teleop_drill/simulation/seeds.py",
+            "                        _reopen(number, own / file.relative_to(place))", "                        pass",
+            f"{_SEEDS}::test_a_schedule_has_the_same_result_alone_and_after_the_start_of_another_one"),
+    _mutant("start_kept", "random numbers of the start go on in the schedule", "teleop_drill/simulation/scheduler.py",
+            '            one.seed(f"{seed}/{name}")', "            pass",
+            f"{_SEEDS}::test_a_schedule_has_the_same_result_alone_and_after_the_start_of_another_one"),
+    _mutant("block_alone", "steps between setpoints that are not judged together are not judged",
+            "teleop_drill/simulation/steps.py", "        if self._last is not None:", "        if False:",
+            "tests/unit/test_steps.py"),
+    _mutant("visitor_idle", "no client, display or supervisor uses a visited session",
+            "teleop_drill/simulation/visits.py", "            if self.may_act and", "            if False and",
+            "tests/simulated/test_seeds.py"),
+    _mutant("unranked", "threads wait for their interpreter without priorities", "teleop_drill/simulation/scheduler.py",
+            "            rank = what.rank\n", "            rank = 0.0\n", "tests/simulated/test_machine.py"),
+    _mutant("rank_kept", "priorities of threads never change", "teleop_drill/simulation/scheduler.py",
+            "what.rank = float(len(self._changes))", "pass", "tests/simulated/test_machine.py"),
+    _mutant("starved", "a thread of low priority waits without end", "teleop_drill/simulation/scheduler.py",
+            "what.waits_ns > _FAIR_NS)", "what.waits_ns > 10**12)", "tests/simulated/test_machine.py"),
 )  # fmt: skip
 """All of them."""
 

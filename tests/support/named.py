@@ -23,6 +23,7 @@ PAGES = sorted({*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("bags
 _LIVE = "needs a session that runs, or is one: tests/ros starts and stops it"
 _DEVICE = "needs a device"
 NOT_RUN = {
+    r"drill .* --scheduler": "needs a Dask scheduler: tests/simulated/test_search.py",
     r"live|console|play|stop|operate|topic|param|service|conformance|drill(?! --list)|--parts mine\.py drill": _LIVE,
     r"camera": _LIVE,
     r"people": "needs a person at the page, or what people did: tests/ros/test_people.py",

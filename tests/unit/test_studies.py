@@ -5,8 +5,6 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,6 +13,7 @@ import numpy as np
 import pytest
 
 import teleop_core as tc
+from cluster import cluster
 from patience import is_alive, wait_until
 from teleop_core.graph.layers import config_folder
 from teleop_lab import Study, read_study, sweep
@@ -276,19 +275,6 @@ def test_a_study_that_is_killed_goes_on_to_the_same_bits(found: Found, tmp_path:
         assert np.array_equal(again[metric].values, data[metric].values, equal_nan=True)
 
 
-@contextmanager
-def dask(folder: Path) -> Iterator[Any]:
-    """Client of a cluster of two workers."""
-    distributed = pytest.importorskip("distributed", reason="Dask is not installed")
-    with (
-        distributed.LocalCluster(
-            n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, local_directory=str(folder)
-        ) as cluster,
-        distributed.Client(cluster, set_as_default=False) as client,
-    ):
-        yield client
-
-
 @pytest.mark.slow
 def test_dask_workers_give_the_same_bits_with_parts_of_ones_own_and_whoever_comes_later(
     found: Found, halves: Any, tmp_path: Path
@@ -297,7 +283,7 @@ def test_dask_workers_give_the_same_bits_with_parts_of_ones_own_and_whoever_come
     made, write = halves
     theirs = tmp_path / "theirs.py"
     theirs.write_text("")
-    with dask(tmp_path / "dask") as client:
+    with cluster(tmp_path / "dask") as client:
         client.run(lambda: os.environ.update(TELEOP_PARTS=str(theirs)))
         again = study().run(client=client)
         for share in (0.5, 0.25):

@@ -61,6 +61,8 @@ ROS = [
     ("drill --seeds 2 --out bags", "--schedule or --seeds 1"),
     ("drill --seeds 2 --search store", "without names, --short, --drives and --search or --schedule"),
     ("drill --search store --composed", "without --composed"), ("drill --search store --minutes nan", "above 0"),
+    ("drill --search store --scheduler nowhere", "no Dask scheduler answers at nowhere"),
+    ("drill --seeds 2 --scheduler tcp://a:1", "--scheduler is 'tcp://a:1', must be given with --search"),
     ("drill --search store --seed today", "seed"), ("drill --seeds 2 stop_topic", "without names"),
     ("drill --seed 3 stop_topic", "with --simulated"),
     *((f"drill --seeds {count}", f"--seeds is {count}, must be at least 1") for count in (0, -1)),

@@ -36,6 +36,8 @@ class Options:
     """With --seeds or --search: fail if an event that must happen sometimes never did."""
     search: Annotated[Path | None, Parameter(metavar="STORE")] = None
     """Search with random schedules for what none has met, and keep those that met it in this directory."""
+    scheduler: str | None = None
+    """With --search: address of a Dask scheduler, to run on its workers."""
     minutes: float = 3.0
     """Duration of --search [min]."""
     breaks: float = 0.0

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from teleop_core.bags.finding import check_new
+from teleop_core.base.cluster import connect
 from teleop_core.base.errors import ParameterError
 from teleop_core.commands.options import ros_module
 from teleop_core.nodes.crews import Processes
@@ -38,7 +39,7 @@ def run_schedules(names: tuple[str, ...], options: Options) -> int:
 
         return _run_one(Schedule.of(options.schedule), options.out)
     if options.search is not None:
-        coverage = _search(options.search, options.minutes, options.seed, options.json)
+        coverage = _search(options.search, options)
     elif options.seeds == 1:
         return _run_one(_drawn(options.seed, processes, options.breaks), options.out)
     else:
@@ -58,6 +59,8 @@ def _check(names: tuple[str, ...], options: Options) -> None:
         raise ParameterError(way, value, "given without --composed and --breaks, which a schedule contains")
     if options.out is not None and way != "--schedule" and options.seeds != 1:
         raise ParameterError("--out", options.out, "given with --schedule or --seeds 1")
+    if options.scheduler is not None and way != "--search":
+        raise ParameterError("--scheduler", options.scheduler, "given with --search")
     if not 0.0 <= options.breaks <= 0.1:
         raise ParameterError("--breaks", options.breaks, "from 0 to 0.1")
     if not (0.0 < options.minutes < math.inf):
@@ -85,16 +88,18 @@ def _run_one(schedule: "Schedule", out: Path | None) -> int:
     return 1 if found.broken else 0
 
 
-def _search(folder: Path, minutes: float, seed: int, json_file: Path | None) -> "Coverage":
+def _search(folder: Path, options: Options) -> "Coverage":
     from rich.console import Console
 
     from teleop_drill.simulation.search import search
     from teleop_drill.simulation.store import Store
 
+    client = connect(options.scheduler) if options.scheduler else None
     store, console, begin, last, laws = Store(folder), Console(), time.monotonic(), -math.inf, set[str]()
-    print(f"{store.coverage.sessions} schedules so far; seeds from {seed + store.coverage.sessions} on", flush=True)
-    for found, new in search(store, seed, 60.0 * minutes):
-        _write(json_file, store.coverage)
+    first = options.seed + store.coverage.sessions
+    print(f"{store.coverage.sessions} schedules so far; seeds from {first} on", flush=True)
+    for found, new in search(store, options.seed, 60.0 * options.minutes, client=client):
+        _write(options.json, store.coverage)
         passed = time.monotonic() - begin
         if passed - last > _EVERY:
             last, left = passed, len(store.coverage.never())

@@ -15,10 +15,8 @@ from teleop_core.bags.messages import layout
 from teleop_core.bags.reader import Bag, recover
 from teleop_core.base.errors import RecordingError
 from teleop_core.graph.operation import State
-from teleop_core.graph.signals import DT
 from teleop_core.graph.topics import NO_COMMAND_NS, SLAVE_SETPOINT_JS
 from teleop_core.kernels.fields import Cells
-from teleop_core.kernels.geometry import Array
 from teleop_core.middleware.platform import Taken
 from teleop_core.slave.commands import CommandStatus
 from teleop_core.slave.velocity import MotionSource
@@ -28,6 +26,7 @@ from teleop_drill.simulation.changes import Changes
 from teleop_drill.simulation.drilled_session import DrilledSession
 from teleop_drill.simulation.machine import Process
 from teleop_drill.simulation.owner import Owner, stamp_of
+from teleop_drill.simulation.steps import StepReader
 
 _LOOK_NS = 5_000_000
 _BAD = ("error", "fatal")
@@ -66,8 +65,6 @@ _JOINING = 20
 """Number of setpoints by which a newly enabled slave moves its setpoint to the arm without a command."""
 _AFTER_STEP_NS = 5_000_000_000
 """Time after a step of the clock in which stamps from before the step may arrive [ns]."""
-_BLOCK = 64
-"""Number of setpoints whose speeds are judged together."""
 _QUEUES = 2500
 """Largest number of messages that may wait in any queue; it is somewhat more than the recorder's longest queue."""
 _SLOW_NS, _GIVEN_WAY_NS = 1_500_000, 4_500_000_000
@@ -128,16 +125,12 @@ class Laws:
         self.under: Counter[tuple[str, str, str]] = Counter()
         self.lost_recorders: set[Process] = set()
         self.begin_ns = self._scheduler.now_ns
-        self._last: tuple[Array, Array] | None = None
-        """Newest judged setpoint: joints, and position of the tip."""
-        self._block: list[bytes] = []
-        """Setpoints whose speeds are not yet judged."""
-        self._block_of: Process | None = None
+        self._steps = StepReader(self._form, stage.robot)
+        self._steps_of: Process | None = None
         first = 4 + 8 * int(self._form.places[0])
-        self._joints, self._at = slice(first, first + 8 * stage.robot.n), b""
-        """Place of the joints in a message, and the newest joints."""
+        self._place, self._joints = slice(first, first + 8 * stage.robot.n), b""
+        """Place of the joints in a message, and the joints of the newest setpoint."""
         self._status, self._has_moved = memoryview(b""), False
-        self._longest_step = numbers.speed_limit * (1.0 + _SLACK) * DT
         self._braking = float(np.max(numbers.speed_limit / numbers.braking))
         self._slave: Any = None
         self._led: Any = None  # stage whose state the cells are
@@ -180,14 +173,13 @@ class Laws:
         self._sent_ns.setdefault(taken.sender, []).append(self._stage.platform.time_ns())
         slave, process = self._stage.session.node("slave"), self._stage.session.process_of("slave")
         data = taken.data
-        if slave is None or process is not self._block_of or len(data) < self._form.size:
-            self._judge_block()
-            self._last, self._block_of, self._at = None, process, b""
+        if slave is None or process is not self._steps_of or len(data) < self._form.size:
+            self._judge_speed()
+            self._steps, self._steps_of, self._joints = StepReader(self._form, self._stage.robot), process, b""
         if slave is None or len(data) < self._form.size:
             return
-        self._block.append(data[: self._form.size])
-        if len(self._block) >= _BLOCK:
-            self._judge_block()
+        if self._steps.add(data):
+            self._judge_speed()
         stamp_ns = stamp_of(taken)
         if slave.stage is not self._led:
             self._led = slave.stage
@@ -195,38 +187,17 @@ class Laws:
             self._status = slave.row.number("command_status")
         self._judge_owner(process, stamp_ns)
         self._judge_engage(data)
-        before, self._at = self._at, data[self._joints]
-        self._has_moved |= before != self._at
+        before, self._joints = self._joints, data[self._place]
+        self._has_moved |= before != self._joints
         if before and self._status[0] == CommandStatus.FRESH:  # otherwise the slave may still brake
-            self._judge_age(stamp_ns, before != self._at)
-
-    def _judge_block(self) -> None:
-        """Judge the speeds of the setpoints since the last call, all of one process."""
-        if not self._block:
-            return
-        rows = np.frombuffer(b"".join(self._block), np.uint8).reshape(len(self._block), -1)
-        self._block.clear()
-        if not self._form.matches(rows):
-            self._last = None
-            return
-        q = self._form.decode(rows)[1][:, : self._stage.robot.n]
-        if not np.isfinite(q).all():
-            self._break("speed", "a setpoint is not a number")
-            self._last = None
-            return
-        tips = self._stage.robot.fk(q)[:, :3, 3]
-        self._stage.setpoint = q[-1]
-        if self._last is not None:
-            q, tips = np.vstack((self._last[0], q)), np.vstack((self._last[1], tips))
-        self._last = q[-1], tips[-1]
-        if len(q) > 1:
-            self._judge_speed(np.abs(np.diff(q, axis=0)), np.linalg.norm(np.diff(tips, axis=0), axis=1))
+            self._judge_age(stamp_ns, before != self._joints)
 
     def _judge_owner(self, process: Process | None, stamp_ns: int) -> None:
         """Check that only one sender commands the arm at a time."""
         self._count("owner")
         cells = self._cells
         is_driven = cells is not None and not cells["is_busy"] and cells["motion"] != _FOLLOWING
+        is_driven = is_driven and cells["driven_ns"] > 0  # an arm that is told to hold is not driven
         if wrong := self._owner.judge(process, stamp_ns, is_driven=is_driven):
             self._break("owner", wrong)
         age_ns = self._scheduler.now_ns - self._stage.driven_ns
@@ -261,23 +232,24 @@ class Laws:
     def _is_quiet(self) -> bool:
         return not self._stage.bus.lines and self._late() < _SOON
 
-    def _judge_speed(self, steps: Array, ways: Array) -> None:
-        """Check steps of the joints (N, n) and of the tip (N,), each in one tick."""
-        self._count("tool speed", len(ways))
-        way, most = float(ways.max()), self._numbers.tool_speed
-        if way > most * DT * (1.0 + _CURVED):
-            self._break("tool speed", f"the setpoint of the tip moved at {way / DT:.3g} m/s, at most {most:.3g}")
-        self._count("speed", len(steps))
-        longest = steps.max(axis=0)
-        if not (longest <= self._longest_step).all():
-            speed = longest / DT
-            joint = int(np.argmax(speed / self._numbers.speed_limit))
+    def _judge_speed(self) -> None:
+        """Check the speeds of the setpoints since the last call."""
+        if (steps := self._steps.steps()) is None:
+            return
+        self._stage.setpoint = steps.setpoint
+        self._count("tool speed", steps.number)
+        if steps.tip > (most := self._numbers.tool_speed) * (1.0 + _CURVED):
+            self._break("tool speed", f"the setpoint of the tip moved at {steps.tip:.3g} m/s, at most {most:.3g}")
+        self._count("speed", steps.number)
+        limit = self._numbers.speed_limit
+        if not (steps.joints <= limit * (1.0 + _SLACK)).all():
+            joint = int(np.argmax(steps.joints / limit))
             self._break(
                 "speed",
-                f"the setpoint of joint {joint + 1} moved at {speed[joint]:.3g}, beyond its drive's "
-                f"{self._numbers.speed_limit[joint]:.3g}",
+                f"the setpoint of joint {joint + 1} moved at {steps.joints[joint]:.3g}, beyond its drive's "
+                f"{limit[joint]:.3g}",
             )
-        if longest.max() > _SLACK * DT:
+        if steps.joints.max() > _SLACK:
             self._moved_at = self._worked
 
     def _judge_age(self, stamp_ns: int, moves: bool) -> None:
@@ -346,7 +318,7 @@ class Laws:
         is_undriven = self._was_driven and undriven > _REST
         if self._has_moved and (is_undriven or (state != State.ENABLED and in_force > self._braking + 0.2)):
             self._has_moved = False
-            self._judge_block()
+            self._judge_speed()
         moves = self._worked - self._moved_at < 1e-9 * _LOOK_NS
         is_moving = moves and state != State.ENABLED and in_force > self._braking + 0.3
         # A setpoint that goes to an arm whose position was unknown is no motion of the arm.
@@ -443,7 +415,7 @@ class Laws:
 
     def finish(self) -> None:
         """Judge the last setpoints."""
-        self._judge_block()
+        self._judge_speed()
 
     @contextmanager
     def reading(self) -> Iterator[None]:

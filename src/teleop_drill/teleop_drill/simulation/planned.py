@@ -9,14 +9,17 @@ from typing import Any
 from teleop_core.base.errors import ParameterError, RecordingError
 from teleop_core.nodes.crews import Processes
 from teleop_drill.simulation.schedules import KINDS, OF_PROCESS, Fault
-from teleop_drill.simulation.seeds import PROCESSES, Found, run_seed
+from teleop_drill.simulation.seeds import PROCESSES, Found, Starts, run_seed
+from teleop_drill.simulation.visits import PLAIN, SESSIONS
 
-VERSION = 1
+VERSION = 2
 """Version of the form of a schedule."""
 _LONGEST = 60.0
 """Latest begin and longest duration of a fault of a given schedule [s]."""
 _MOST = 100
 """Largest number of faults of a given schedule."""
+DEPTHS = 9
+"""Largest depth of a schedule."""
 
 
 @dataclass(frozen=True)
@@ -28,22 +31,41 @@ class Schedule:
         faults: The faults.
         processes: Distribution of the nodes over processes.
         breaks: As in :func:`~teleop_drill.simulation.seeds.run_seed`.
+        depth: As in :class:`~teleop_drill.simulation.scheduler.Scheduler`.
+        session: Kind of session, one of :data:`~teleop_drill.simulation.visits.SESSIONS`.
     """
 
     seed: int
     faults: tuple[Fault, ...]
     processes: Processes = Processes.SIDES
     breaks: float = 0.0
+    depth: int = 0
+    session: str = PLAIN
+
+    @classmethod
+    def of_found(cls, found: Found) -> "Schedule":
+        """Schedule that had a result."""
+        return cls(found.seed, found.faults, found.processes, found.breaks, found.depth, found.session)
 
     def run(self, folder: Path | None = None) -> Found:
         """Run the schedule; the recording is kept in a folder if one is given."""
-        return run_seed(self.seed, self.faults, folder, self.processes, self.breaks)
+        return run_seed(self.seed, self.faults, folder, self.processes, self.breaks, self.depth, self.session)
+
+    def run_in(self, starts: Starts) -> tuple[Found, list[str]]:
+        """Run the schedule after a start that it shares with others; returns its result and the branches that ran."""
+        return starts.run(self.seed, self.faults, self.processes, self.breaks, self.depth, self.session)
 
     def plain(self) -> dict[str, Any]:
         """Plain values for JSON."""
-        faults = [[one.at, one.kind, one.where, one.seconds, one.amount] for one in self.faults]
-        nodes = self.processes.value
-        return {"version": VERSION, "seed": self.seed, "nodes": nodes, "breaks": self.breaks, "faults": faults}
+        return {
+            "version": VERSION,
+            "seed": self.seed,
+            "nodes": self.processes.value,
+            "breaks": self.breaks,
+            "depth": self.depth,
+            "session": self.session,
+            "faults": [[one.at, one.kind, one.where, one.seconds, one.amount] for one in self.faults],
+        }
 
     def command(self) -> str:
         """Command that runs the schedule again."""
@@ -64,17 +86,22 @@ class Schedule:
     @classmethod
     def _of_plain(cls, plain: dict[str, Any]) -> "Schedule":
         check_version(plain, "the schedule")
-        seed, nodes, breaks = plain.get("seed"), plain.get("nodes"), plain.get("breaks", 0.0)
+        values: list[Any] = [plain.get(name) for name in ("seed", "nodes", "breaks", "depth", "session")]
+        seed, nodes, breaks, depth, session = values
         if isinstance(seed, bool) or not isinstance(seed, int):
             raise ParameterError("seed of the schedule", seed, "an integer")
         if nodes not in [one.value for one in PROCESSES]:
             raise ParameterError("nodes of the schedule", nodes, f"of {', '.join(one.value for one in PROCESSES)}")
         if not _is_number(breaks, 0.1):
             raise ParameterError("breaks of the schedule", breaks, "from 0 to 0.1")
+        if isinstance(depth, bool) or depth not in range(DEPTHS + 1):
+            raise ParameterError("depth of the schedule", depth, f"an integer from 0 to {DEPTHS}")
+        if not isinstance(session, str) or session not in SESSIONS:
+            raise ParameterError("session of the schedule", session, f"of {', '.join(SESSIONS)}")
         faults, processes = plain.get("faults"), Processes(nodes)
         if not isinstance(faults, list) or len(faults) > _MOST:
             raise ParameterError("faults of the schedule", faults, f"a list of at most {_MOST}")
-        return cls(seed, tuple(_fault(one, processes) for one in faults), processes, breaks)
+        return cls(seed, tuple(_fault(one, processes) for one in faults), processes, breaks, depth, session)
 
 
 def _fault(values: object, processes: Processes) -> Fault:

@@ -104,7 +104,7 @@ def told(found: Found, shortest: Found, law: str) -> list[str]:
         law: Name of the law.
     """
     (one,) = (broken for broken in shortest.broken if broken.law == law)
-    planned = Schedule(found.seed, shortest.faults, found.processes, found.breaks)
+    planned = Schedule.of_found(shortest)
     return [
         f"seed {found.seed} breaks `{law}`, {one.at:.3f} s after the arm followed: {one.text}",
         *(f"    {fault.text()}" for fault in shortest.faults),

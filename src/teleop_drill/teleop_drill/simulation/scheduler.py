@@ -2,7 +2,8 @@
 
 A strand is a thread of a simulated process. Only one strand runs at a time, until it waits for a time, a lock or a
 message. Strands of one process share its interpreter, so in simulated time they exclude each other; strands of
-different processes run in parallel. Events are ordered by time, then by the order in which they were scheduled.
+different processes run in parallel. Events are ordered by time, then by the order in which they were scheduled. With a
+depth, the priorities of strands decide instead, as in PCT (Burckhardt et al., ASPLOS 2010).
 """
 
 import heapq
@@ -18,6 +19,12 @@ from teleop_drill.simulation.reach import BEGIN_NS, LOOK_NS
 
 _BREAK_NS = 1_000_000
 """Longest time for which an interrupted thread waits for other threads of its process [ns]."""
+_LATE_NS = 200_000
+"""Lateness of the strand with the lowest priority, if priorities decide [ns]."""
+_FAIR_NS = 10_000_000
+"""Longest time for which strands with a higher priority pass a strand that waits for its interpreter [ns]."""
+_SPAN_NS = 15_000_000_000
+"""Time over which the changes of priorities are drawn, about the length of a schedule [ns]."""
 
 
 class Deadlock(Exception):  # noqa: N818
@@ -76,6 +83,10 @@ class Strand:
         self.token = 0  # a wake-up for an earlier wait is ignored
         self.has_priority = False
         self.used_ns = 0  # processor time of all turns
+        self.rank = scheduler.priorities.random() if scheduler.depth else 0.0
+        """Priority, if the scheduler has a depth: from two strands that can run, the one with the smaller rank runs."""
+        self.waits_ns = 0
+        """Time since which the strand waits for the interpreter of its process [ns]; 0 while it does not."""
         self.error: BaseException | None = None
         # When a greenlet ends, its creator continues, unless another parent is set.
         self.greenlet = greenlet(self._run, parent=scheduler.hub)
@@ -161,6 +172,8 @@ class Scheduler:
     Args:
         seed: Seed of all random numbers.
         breaks: Share of the clock readings after which the interpreter switches to another thread.
+        depth: Number of ordering constraints of the faults that are searched for, at most 9. Each strand has a random
+            priority, and at ``depth - 1`` random times the strand that runs gets a low one. 0: no priorities.
 
     Attributes:
         now: Memory of the monotonic time [ns], with one element; as :attr:`now_ns`, but faster.
@@ -171,15 +184,18 @@ class Scheduler:
         costs: Durations of all operations.
     """
 
-    def __init__(self, seed: int, breaks: float = 0.0) -> None:
-        self.seed, self.breaks = seed, breaks
+    def __init__(self, seed: int, breaks: float = 0.0, depth: int = 0) -> None:
+        self.seed, self.breaks, self.depth = seed, breaks, depth
         now = np.full(1, BEGIN_NS)
         self.now, self.now_at = now.data, int(now.ctypes.data)
         self.error: BaseException | None = None
         self._randoms: list[tuple[str, Random]] = []
+        self.priorities = self.random("priorities")
+        self._changes = self._drawn_changes()
+        """Times of the remaining changes of priorities [ns]."""
         self._breaking = self.random("breaks")
         self.costs = Costs(self.random("costs"))
-        self._queue: list[tuple[int, int, Any, int, bool]] = []
+        self._queue: list[tuple[int, float, int, Any, int, bool]] = []
         self._orders, self.hub = count(), getcurrent()
         self._outside = Strand(self, Turns(), "outside", lambda: None)
         self.current = self._outside
@@ -191,11 +207,18 @@ class Scheduler:
         self._randoms.append((name, made))
         return made
 
-    def seed_again(self, seed: int) -> None:
-        """Let all random generators go on from another seed."""
-        self.seed = seed
+    def seed_again(self, seed: int, depth: int = 0) -> None:
+        """Let all random generators go on from another seed, and priorities be of another depth."""
+        self.seed, self.depth = seed, depth
         for name, one in self._randoms:
             one.seed(f"{seed}/{name}")
+        self._changes = self._drawn_changes()
+        for strand in self._kept:
+            strand.rank = self.priorities.random() if depth else 0.0
+
+    def _drawn_changes(self) -> list[int]:
+        """Times at which the strand that runs gets a low priority [ns]."""
+        return sorted(self.now_ns + self.priorities.randrange(_SPAN_NS) for _ in range(self.depth - 1))
 
     @property
     def now_ns(self) -> int:
@@ -226,8 +249,7 @@ class Scheduler:
 
     def sleep(self, seconds: float) -> None:
         """Let the strand wait for a time [s]."""
-        late = self.costs.wake(has_priority=self.current.has_priority)
-        self._switch(self.now_ns + max(0, round(1e9 * seconds)) + late)
+        self._switch(self.now_ns + max(0, round(1e9 * seconds)) + self._late(self.current))
 
     def wait(self, seconds: float | None) -> bool:
         """Wait until this strand is woken, at most for a time [s]; returns whether it was woken."""
@@ -245,8 +267,14 @@ class Scheduler:
 
     def wake(self, strand: Strand) -> None:
         """Wake a waiting strand, which then continues soon."""
-        late = self.costs.wake(has_priority=strand.has_priority)
-        self._push(self.now_ns + late, strand, strand.token, True)
+        self._push(self.now_ns + self._late(strand), strand, strand.token, True)
+
+    def _late(self, strand: Strand) -> int:
+        """Delay from the time at which a strand is due until it runs [ns]."""
+        late_ns = self.costs.wake(has_priority=strand.has_priority)
+        if self.depth:  # strands that are due within `_LATE_NS` run by their priorities
+            late_ns = round(_LATE_NS * min(1.0, strand.rank)) + max(0, late_ns - _LATE_NS)
+        return late_ns
 
     def at(self, time_ns: int, event: Callable[[], object]) -> None:
         """Schedule an event at a time [ns]."""
@@ -285,7 +313,7 @@ class Scheduler:
         """Run the simulation until the thread outside of it continues; return whether a strand woke that thread."""
         queue, pop = self._queue, heapq.heappop
         while queue:
-            time_ns, _, what, token, value = pop(queue)
+            time_ns, _, _, what, token, value = pop(queue)
             if not isinstance(what, Strand):
                 self.now_ns = time_ns
                 what()
@@ -297,8 +325,13 @@ class Scheduler:
                 process.parked.append((what, token, value))
                 continue
             if process.busy_ns > time_ns:
+                what.waits_ns = what.waits_ns or time_ns
                 self._push(process.busy_ns, what, token, value)
                 continue
+            what.waits_ns = 0
+            if self._changes and self._changes[0] <= time_ns:
+                what.rank = float(len(self._changes))
+                del self._changes[0]
             self.now_ns, self.current = time_ns, what
             what.token += 1
             if what is self._outside:
@@ -312,4 +345,7 @@ class Scheduler:
         raise Deadlock("deadlock: every process waits for another one")
 
     def _push(self, time_ns: int, what: Any, token: int, value: bool) -> None:
-        heapq.heappush(self._queue, (time_ns, next(self._orders), what, token, value))
+        rank = 0.0
+        if self.depth and isinstance(what, Strand) and not (what.waits_ns and time_ns - what.waits_ns > _FAIR_NS):
+            rank = what.rank
+        heapq.heappush(self._queue, (time_ns, rank, next(self._orders), what, token, value))

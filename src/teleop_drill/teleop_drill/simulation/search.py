@@ -3,11 +3,16 @@
 import os
 import time
 from collections import Counter, deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future
+from contextlib import contextmanager
 from dataclasses import replace
 from random import Random
+from threading import Lock
+from typing import TYPE_CHECKING, Any
 
+from teleop_core.base.cluster import TRIES, check_code, check_codes
+from teleop_core.base.errors import SessionError
 from teleop_core.base.workers import workers
 from teleop_core.graph.operation import State
 from teleop_core.nodes.crews import Processes
@@ -17,7 +22,11 @@ from teleop_drill.simulation.branches import Branches
 from teleop_drill.simulation.planned import Schedule
 from teleop_drill.simulation.schedules import BEGIN, KINDS, OF_PROCESS, Fault, commanded
 from teleop_drill.simulation.seeds import PROCESSES, Found, Starts, warm
-from teleop_drill.simulation.store import Store
+from teleop_drill.simulation.store import Store, code_digest
+from teleop_drill.simulation.visits import PLAIN, SESSIONS
+
+if TYPE_CHECKING:
+    from distributed import Client
 
 _MOST = 30
 """Largest number of faults of a schedule."""
@@ -25,9 +34,14 @@ _FRESH = 0.4
 """Share of schedules that are drawn anew; the others are bred from kept ones."""
 _AHEAD = 4
 """A schedule is chosen when all but this many before it are known, so that the number of cores changes nothing."""
+_AHEAD_OF_CLUSTER = 32
 _BREAKS = 0.0005
 _END = 5.0
 """Latest time of a drawn fault [s]: many faults at once need less time than one after the other."""
+_DEEP, _DEPTHS = 0.25, (1, 2, 2, 3, 4)
+"""Share of schedules in which priorities of threads decide, and the depths of these."""
+_PLAIN = 0.4
+"""Share of schedules with the plain session at least; the others draw from all kinds."""
 _LEADS = {
     State.DISABLED.name: ("reset", "disable"),
     State.ENABLED.name: ("reset", "enable", "resume"),
@@ -79,7 +93,7 @@ class Search:
         kinds = switched_on(random)
         faults = [one for _ in range(random.randint(2, 8)) for one in self._aimed(random, kinds, processes)]
         breaks = _BREAKS if random.random() < 0.2 else 0.0
-        return Schedule(seed, _tidy(random, faults), processes, breaks)
+        return Schedule(seed, _tidy(random, faults), processes, breaks, _depth(random), _session(random))
 
     def _aimed(self, random: Random, kinds: Sequence[str], processes: Processes) -> list[Fault]:
         """A fault in a state of the arm, and what brings the arm there."""
@@ -113,7 +127,9 @@ class Search:
             change = random.choice((self._add, self._move, self._swap, self._join, self._vary, self._leave_out))
             faults = change(random, faults, parent.processes) or faults
         seed = random.choice((seed, parent.seed))
-        return replace(parent, seed=seed, faults=_tidy(random, faults))
+        depth = parent.depth if random.random() < 0.8 else _depth(random)
+        session = parent.session if random.random() < 0.8 else _session(random)
+        return replace(parent, seed=seed, faults=_tidy(random, faults), depth=depth, session=session)
 
     def _parent(self, random: Random) -> Schedule:
         """A kept schedule; one with rare events and few children has the largest weight."""
@@ -167,6 +183,14 @@ class Search:
         return faults if len(faults) < 2 else random.sample(faults, len(faults) - 1)
 
 
+def _depth(random: Random) -> int:
+    return random.choice(_DEPTHS) if random.random() < _DEEP else 0
+
+
+def _session(random: Random) -> str:
+    return PLAIN if random.random() < _PLAIN else random.choice(sorted(SESSIONS))
+
+
 def switched_on(random: Random) -> list[str]:
     """About half of the kinds of faults."""
     return [kind for kind in sorted(KINDS) if random.random() < 0.5] or sorted(KINDS)
@@ -194,46 +218,96 @@ def _tidy(random: Random, faults: Sequence[Fault]) -> tuple[Fault, ...]:
     return tuple(sorted(short, key=lambda one: one.at))
 
 
+Measured = tuple[Found, list[str]]
+"""Result of a schedule, and the branches that it ran."""
 Result = tuple[Found, tuple[str, ...]]
 """Result of a schedule, and what no earlier schedule had met."""
 
 
-def search(store: Store, seed: int, seconds: float, cores: int | None = None) -> Iterator[Result]:
+def search(
+    store: Store,
+    seed: int,
+    seconds: float,
+    cores: int | None = None,
+    client: "Client | None" = None,
+    ahead: int | None = None,
+) -> Iterator[Result]:
     """Run schedules for a time, and keep in the store those that meet something first.
 
-    The same store, seed and number of schedules give the same schedules, on any number of cores.
+    The same store, seed, ``ahead`` and number of schedules give the same schedules, on any number of cores or workers.
 
     Args:
         store: Schedules and counts so far.
         seed: As of :class:`Search`.
         seconds: Time after which no further schedule begins [s].
-        cores: Number of processes; None: one for each core.
+        cores: Number of processes of this machine; None: one for each core.
+        client: Connection to a Dask cluster, whose workers then run the schedules.
+        ahead: A schedule is chosen when all but this many before it are known; None: 4, and 32 on a cluster. This is
+            also the largest number of schedules that run at once.
 
     Returns:
         Iterator over the results, each with what no earlier schedule had met.
+
+    Raises:
+        SessionError: The code of a worker differs, there is no worker, or a process or worker died.
     """
-    chosen, cores = Search(store, seed), cores or len(os.sched_getaffinity(0))
-    end = time.monotonic() + seconds
-    waiting: deque[Future[tuple[Found, list[str]]]] = deque()
+    chosen, end = Search(store, seed), time.monotonic() + seconds
+    ahead = ahead or (_AHEAD if client is None else _AHEAD_OF_CLUSTER)
+    waiting: deque[Future[Measured]] = deque()
 
     def take() -> Result:
         found, branches = waiting.popleft().result()
         return found, store.add(found, branches)
 
     try:
-        with workers(cores, warm) as pool:
+        with _submitting(cores, client) as submit:
             while time.monotonic() < end:
-                if len(waiting) >= _AHEAD:
+                if len(waiting) >= ahead:
                     yield take()
-                waiting.append(pool.submit(_run_apart, chosen.choose()))
+                waiting.append(submit(chosen.choose()))
             while waiting:
                 yield take()
     finally:
         store.save()
 
 
-_starts = Starts(Branches())
+@contextmanager
+def _submitting(cores: int | None, client: "Client | None") -> "Iterator[Callable[[Schedule], Future[Measured]]]":
+    """Function that lets a process of this machine or of a cluster run a schedule."""
+    if client is None:
+        with workers(cores or len(os.sched_getaffinity(0)), warm) as pool:
+            yield lambda schedule: pool.submit(_run_apart, schedule)
+        return
+    from distributed import KilledWorker
+
+    check_codes(client, code_digest)
+    tasks: list[Any] = []
+
+    def submit(schedule: Schedule) -> "Future[Measured]":
+        tasks.append(client.submit(_run_there, schedule, code_digest(), pure=False, retries=TRIES))
+        return tasks[-1]  # type: ignore[no-any-return]
+
+    try:
+        yield submit
+    except KilledWorker as error:
+        raise SessionError(f"a worker died in each of {TRIES + 1} tries of a schedule") from error
+    finally:
+        client.cancel(tasks)
 
 
-def _run_apart(schedule: Schedule) -> tuple[Found, list[str]]:
-    return _starts.run(schedule.seed, schedule.faults, schedule.processes, schedule.breaks)
+_starts, _is_warm, _one_at_a_time = Starts(Branches()), False, Lock()
+
+
+def _run_apart(schedule: Schedule) -> Measured:
+    return schedule.run_in(_starts)
+
+
+def _run_there(schedule: Schedule, code: str) -> Measured:
+    """Run a schedule on a worker of a cluster, in a copy of its process."""
+    global _is_warm
+    check_code(code, code_digest)
+    with _one_at_a_time:  # a worker may have several threads, but a process has one working directory
+        if not _is_warm:
+            warm()
+            _is_warm = True
+        return _run_apart(schedule)

@@ -10,6 +10,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
+from typing import NamedTuple
 
 from teleop_core.base.workers import apart, workers
 from teleop_core.graph.graph import RECORDER_NAME
@@ -17,6 +18,7 @@ from teleop_core.graph.operation import State
 from teleop_core.nodes.crews import Processes
 from teleop_core.nodes.start import SESSION
 from teleop_core.session import api
+from teleop_core.session.configuration import Configuration
 from teleop_drill.drill import hand
 from teleop_drill.drill.numbers import Numbers
 from teleop_drill.simulation import sometimes
@@ -24,10 +26,12 @@ from teleop_drill.simulation.branches import Branches
 from teleop_drill.simulation.bus import Bus
 from teleop_drill.simulation.drilled_session import DrilledSession
 from teleop_drill.simulation.laws import Broken, Laws
-from teleop_drill.simulation.machine import Machine
+from teleop_drill.simulation.machine import Machine, Process
+from teleop_drill.simulation.platform import SimulatedPlatform
 from teleop_drill.simulation.reach import BEGIN_NS
 from teleop_drill.simulation.scheduler import Scheduler
 from teleop_drill.simulation.schedules import KINDS, Fault, draw
+from teleop_drill.simulation.visits import PLAIN, SESSIONS, Visitor
 
 PROCESSES = {Processes.SIDES: ("hand_side", "slave_side", RECORDER_NAME), Processes.ONE: (SESSION, RECORDER_NAME)}
 """Processes that a schedule may affect, by the distribution of the nodes."""
@@ -61,6 +65,8 @@ class Found:
         faults: The faults that were injected.
         processes: Distribution of the nodes over processes.
         breaks: Share of the clock readings after which another thread of the process runs.
+        depth: As in :class:`~teleop_drill.simulation.scheduler.Scheduler`.
+        session: Name of the kind of session, as in :data:`~teleop_drill.simulation.visits.SESSIONS`.
         broken: Breaches of laws.
         met: Number of times that each fault happened in each state of the arm.
         looks: Number of checks of each law.
@@ -74,6 +80,8 @@ class Found:
     faults: tuple[Fault, ...]
     processes: Processes = Processes.SIDES
     breaks: float = 0.0
+    depth: int = 0
+    session: str = PLAIN
     broken: tuple[Broken, ...] = ()
     met: Counter[tuple[str, str]] = field(default_factory=Counter)
     looks: Counter[str] = field(default_factory=Counter)
@@ -89,6 +97,8 @@ def run_seed(
     folder: Path | None = None,
     processes: Processes = Processes.SIDES,
     breaks: float = 0.0,
+    depth: int = 0,
+    session: str = PLAIN,
 ) -> Found:
     """Run one schedule.
 
@@ -101,10 +111,27 @@ def run_seed(
         folder: Folder of the recording; None for no recording.
         processes: Distribution of the nodes over processes: by side, or all nodes except the recorder in one process.
         breaks: Share of the clock readings after which another thread of the process runs.
+        depth: As in :class:`~teleop_drill.simulation.scheduler.Scheduler`.
+        session: As in :class:`Found`.
     """
     planned = draw(seed, PROCESSES[processes]) if faults is None else tuple(faults)
     with _inside(folder):
-        return _Run(seed % _STARTS, processes, breaks).run(seed, planned)
+        return _Run(_Start.of(seed, processes, breaks, session)).run(seed, planned, depth)
+
+
+class _Start(NamedTuple):
+    """All that the start of a session depends on."""
+
+    number: int
+    processes: Processes
+    breaks: float
+    session: str
+
+    @classmethod
+    def of(cls, seed: int, processes: Processes, breaks: float, session: str) -> "_Start":
+        """Start of a schedule; sessions of rare kinds have one start, because each that waits takes memory."""
+        is_frequent = session == PLAIN and not breaks
+        return cls(seed % _STARTS if is_frequent else 0, processes, breaks, session)
 
 
 @contextmanager
@@ -132,23 +159,24 @@ class Starts:
 
     def __init__(self, branches: Branches | None = None) -> None:
         self._branches = branches
-        self._waiting: dict[tuple[int, Processes, float], tuple[_Run, Path, list[str]]] = {}
+        self._waiting: dict[_Start, tuple[_Run, Path, list[str]]] = {}
         self._ends = ExitStack()
 
     def run(
-        self, seed: int, faults: Sequence[Fault] | None, processes: Processes, breaks: float
-    ) -> tuple[Found, list[str]]:
+        self, seed: int, faults: Sequence[Fault] | None, processes: Processes = Processes.SIDES,
+        breaks: float = 0.0, depth: int = 0, session: str = PLAIN,
+    ) -> tuple[Found, list[str]]:  # fmt: skip
         """Run one schedule, see :func:`run_seed`; returns its result and the branches that ran."""
         planned = draw(seed, PROCESSES[processes]) if faults is None else tuple(faults)
-        key = seed % _STARTS, processes, breaks
+        key = _Start.of(seed, processes, breaks, session)
         if key not in self._waiting:
             place = Path(self._ends.enter_context(tempfile.TemporaryDirectory(prefix="drill_"))).resolve()
             self._begin()
             with _inside(place):
-                self._waiting[key] = _Run(*key), place, self._ran()
-        return apart(partial(self._go_on, key, seed, planned))
+                self._waiting[key] = _Run(key), place, self._ran()
+        return apart(partial(self._go_on, key, seed, planned, depth))
 
-    def _go_on(self, key: tuple[int, Processes, float], seed: int, faults: Sequence[Fault]) -> tuple[Found, list[str]]:
+    def _go_on(self, key: _Start, seed: int, faults: Sequence[Fault], depth: int) -> tuple[Found, list[str]]:
         """Run a schedule in a copy of the process that started the session, with copies of its files."""
         run, place, ran = self._waiting[key]
         self._begin()
@@ -159,8 +187,13 @@ class Starts:
                     file = Path(os.readlink(f"/proc/self/fd/{number}"))
                     if file.is_relative_to(place):
                         _reopen(number, own / file.relative_to(place))
-            found = run.run(seed, faults)
+            found = run.run(seed, faults, depth)
         return found, sorted({*ran, *self._ran()})
+
+    def close(self) -> None:
+        """Remove the files of the waiting sessions."""
+        self._waiting.clear()
+        self._ends.close()
 
     def _begin(self) -> None:
         if self._branches is not None:
@@ -181,46 +214,56 @@ def _reopen(number: int, file: Path) -> None:
 class _Run:
     """A session that has started, and the schedule that it runs then."""
 
-    def __init__(self, start: int, processes: Processes, breaks: float) -> None:
-        made = api.configuration("free_motion", texts=(*_CIRCLE, "real_time.priority=20"))
+    def __init__(self, start: _Start) -> None:
+        kind = SESSIONS[start.session]
+        texts = (*(_CIRCLE if kind.has_circle else ()), "real_time.priority=20", *kind.texts)
+        made = api.configuration(kind.scenario, texts=texts)
         numbers = Numbers.of(made)
-        machine = Machine(Scheduler(start, breaks))
+        machine = Machine(Scheduler(start.number, start.breaks))
         self._scheduler, self._bus = machine.scheduler, Bus(machine.scheduler)
         owner = machine.outsider("drill")
         self._bus.watch(owner)
-        self._found = Found(start, (), processes, breaks)
-        self._stage = DrilledSession(self._bus, owner, made, numbers.robot, Path(), processes)
+        self._start, self._found = start, Found(start.number, ())
+        self._stage = DrilledSession(self._bus, owner, made, numbers.robot, Path(), start.processes)
         self._laws = Laws(self._stage, numbers)
         self._ends: list[Callable[[], None]] = []
         self._error: Exception | None = None
+        self._visitor: Visitor | None = None
         try:
+            if kind.is_visited:
+                self._visit(made)
             self._stage.session.start()
             self._laws.judge_recovery(self._await(_START), _START)
         except Exception as error:
             self._error = error
 
-    def run(self, seed: int, faults: Sequence[Fault]) -> Found:
+    def run(self, seed: int, faults: Sequence[Fault], depth: int) -> Found:
         """Run a schedule; an error in it breaks the law ``runs``, because it must not end all other schedules."""
-        self._found = Found(seed, tuple(faults), self._found.processes, self._found.breaks)
+        _, processes, breaks, session = self._start
+        self._found = Found(seed, tuple(faults), processes, breaks, depth, session)
         try:
             if self._error is not None:
                 raise self._error
-            self._scheduler.seed_again(seed)
+            self._scheduler.seed_again(seed, depth)
             self._judge()
         except Exception as error:
             at = 1e-9 * (self._scheduler.now_ns - BEGIN_NS)
             text = "".join(traceback.format_exception(error)[-2:])
             broken = (Broken("runs", at, text),)
-            return Found(seed, tuple(faults), self._found.processes, self._found.breaks, broken, seconds=at)
+            return Found(seed, tuple(faults), processes, breaks, depth, session, broken, seconds=at)
         return self._found
 
     def _judge(self) -> None:
         self._laws.begin_ns = self._scheduler.now_ns
+        if self._visitor is not None:
+            self._visitor.may_act = True
         for fault in self._found.faults:
             at_ns = self._laws.begin_ns + round(1e9 * fault.at)
             self._scheduler.at(at_ns, partial(self._begin, fault))
         last = max((fault.at + fault.seconds for fault in self._found.faults), default=0.0)
         self._wait(last + 0.5)
+        if self._visitor is not None:
+            self._visitor.may_act = False
         for end in self._ends:
             end()
         self._stage.command(sometimes.RELEASE)
@@ -242,8 +285,8 @@ class _Run:
         self._stage.sometimes[sometimes.DISK_STAYS] += any(not one.is_dead for one in outlives)
         self._stage.session.close()
         with self._laws.reading():
-            if self._was("clock step") or self._was("clock drift"):
-                pass  # the times of a recording are those of the clock
+            if self._visitor or self._was("clock step") or self._was("clock drift"):
+                pass  # the times of a recording are those of the clock, and a visitor ends and splits recordings
             elif not was_killed:
                 self._laws.judge_recording(first, {} if recorder is None else recorder.values())
             elif killed_ns is not None and not any(map(self._was, _HINDER)):
@@ -253,6 +296,15 @@ class _Run:
         self._found.looks.update(self._laws.looks)
         self._found.under.update(self._laws.under)
         self._found.sometimes.update(self._stage.sometimes)
+
+    def _visit(self, made: Configuration) -> None:
+        """Start the program that uses the session."""
+
+        def work(process: Process) -> int:
+            self._visitor = Visitor(SimulatedPlatform(self._bus, process), made)
+            return self._visitor.run()
+
+        self._bus.watch(self._stage.machine.start("visitor", work))
 
     def _begin(self, fault: Fault) -> None:
         state, seen = self._stage.state, self._stage.sometimes
@@ -301,7 +353,7 @@ def shrink(found: Found, law: str) -> Found:
     while size > 0:
         for begin in range(0, len(best.faults), size):
             fewer = best.faults[:begin] + best.faults[begin + size :]
-            again = run_seed(found.seed, fewer, None, found.processes, found.breaks)
+            again = run_seed(found.seed, fewer, None, found.processes, found.breaks, found.depth, found.session)
             if any(one.law == law for one in again.broken):
                 best, size = again, min(size, len(again.faults))
                 break

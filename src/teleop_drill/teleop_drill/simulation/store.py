@@ -127,7 +127,7 @@ class Store:
         new = tuple(sorted(met - self.times.keys()))
         self.times.update(met)
         if new or found.broken:
-            schedule = Schedule(found.seed, found.faults, found.processes, found.breaks)
+            schedule = Schedule.of_found(found)
             kept = Kept(schedule, new, tuple(one.law for one in found.broken), _name(number))
             self._write(kept.file, schedule.plain() | {"new": new, "broken": kept.broken})
             self.kept.append(kept)

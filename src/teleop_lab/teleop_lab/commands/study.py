@@ -1,15 +1,12 @@
 """``teleop study``: sessions over named values of parameters; an interrupted study can be continued."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from cyclopts import Parameter
 
-from teleop_core.base.errors import SessionError
+from teleop_core.base.cluster import connect
 from teleop_lab.commands.outputs import Outputs
-
-if TYPE_CHECKING:
-    from distributed import Client
 
 
 def study(
@@ -61,7 +58,7 @@ def study(
     print(explained)
     if explain:
         return 0
-    client = _client(scheduler) if scheduler else None
+    client = connect(scheduler) if scheduler else None
     with shown_progress(file.stem) as progress:
         found = wanted.run(store, jobs=outputs.jobs, client=client, recordings=recordings, progress=progress)
     print(study_table(wanted, found))
@@ -70,19 +67,3 @@ def study(
         print(f"{len(failed)} of {explained.sessions} failed; first: {failed[0]}")
     outputs.write(found.to_dataframe().to_csv, lambda: study_page(wanted, found, file.stem))
     return 1 if failed else 0
-
-
-def _client(address: str) -> "Client":
-    """Connect to a Dask scheduler.
-
-    Raises:
-        SessionError: The address has no scheduler, or Dask is not installed.
-    """
-    try:
-        from distributed import Client
-    except ImportError as error:
-        raise SessionError("--scheduler needs Dask: pip install teleop_lab[dask]") from error
-    try:
-        return Client(address, timeout="10s", set_as_default=False)
-    except (OSError, ValueError) as error:
-        raise SessionError(f"no Dask scheduler answers at {address}") from error

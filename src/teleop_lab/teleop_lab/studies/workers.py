@@ -12,6 +12,7 @@ from pathlib import Path
 from shutil import rmtree
 from typing import TYPE_CHECKING
 
+from teleop_core.base.cluster import TRIES, check_code, check_codes, codes
 from teleop_core.base.errors import SessionError
 from teleop_core.base.own_parts import forget_own_parts, load_own_parts, named_files
 from teleop_core.base.workers import workers
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
 
 BATCH = 100
 """Largest number of sessions per task of a cluster; a scheduler can manage about 0.2 million tasks."""
-_TRIES = 3
 _FOLDER = "teleop_parts_"
 
 
@@ -51,7 +51,7 @@ def in_processes(
         yield from map(do, points)
         return
     left = {point.name: point for point in points}
-    for _ in range(_TRIES):
+    for _ in range(TRIES):
         with workers(count, partial(load_own_parts, tuple(parts))) as pool:
             try:
                 for result in _as_they_come(pool, do, list(left.values()), 2 * count):
@@ -64,7 +64,7 @@ def in_processes(
                 raise SessionError(f"{text} below `if __name__ == '__main__':`, in a file") from None
         return
     for point in left.values():
-        yield PointResult(point.name, point.key, {}, f"its process died {_TRIES} times", 0.0)
+        yield PointResult(point.name, point.key, {}, f"its process died {TRIES} times", 0.0)
 
 
 def _as_they_come(pool: Executor, do: "partial[PointResult]", points: list[Point], most: int) -> Iterator[PointResult]:
@@ -97,17 +97,12 @@ def on_dask(
     """
     from distributed import as_completed
 
-    own = code_digest()
-    fit, others = _codes(client, own)
-    for worker, code in others.items():
-        raise SessionError(f"worker {worker} has code {code}, must be ours, {own}")
-    if not fit:
-        raise SessionError(f"{client.scheduler.address} has no workers")  # type: ignore[union-attr]
+    fit = check_codes(client, code_digest)
     texts = tuple((part.name, part.read_text("utf-8")) for part in parts)
-    do = partial(_batch, metrics=tuple(metrics), parts=texts, code=own)
+    do = partial(_batch, metrics=tuple(metrics), parts=texts, code=code_digest())
     size = max(1, min(BATCH, len(points) // (4 * len(fit)) or 1))
     batches = [points[at : at + size] for at in range(0, len(points), size)]
-    futures = {client.submit(do, batch, pure=False, retries=_TRIES): batch for batch in batches}
+    futures = {client.submit(do, batch, pure=False, retries=TRIES): batch for batch in batches}
     repeated = set[object]()
     waiting = as_completed(list(futures), loop=client.loop)
     try:
@@ -115,9 +110,9 @@ def on_dask(
             batch = futures.pop(future)
             if future.status == "finished":
                 yield from future.result()
-            elif future.key not in repeated and all(codes := _codes(client, own)):  # a worker with other code joined
-                # later
-                again = client.submit(do, batch, pure=False, retries=_TRIES, workers=codes[0])
+            elif future.key not in repeated and all(found := codes(client, code_digest)):
+                # a worker with other code joined later
+                again = client.submit(do, batch, pure=False, retries=TRIES, workers=found[0])
                 futures[again] = batch
                 repeated.add(again.key)
                 waiting.add(again)
@@ -131,12 +126,6 @@ def on_dask(
         client.cancel(list(futures))
 
 
-def _codes(client: "Client", own: str) -> tuple[list[str], dict[str, object]]:
-    """Return the addresses of workers with the same code, and the code of all other workers; workers may join later."""
-    found = client.run(code_digest, on_error="return")
-    return [worker for worker, code in found.items() if code == own], {w: c for w, c in found.items() if c != own}
-
-
 def _batch(
     points: Sequence[Point], metrics: tuple[str, ...], parts: tuple[tuple[str, str], ...], code: str
 ) -> list[PointResult]:
@@ -145,8 +134,7 @@ def _batch(
     Raises:
         SessionError: This worker joined later, and its code differs.
     """
-    if code_digest() != code:
-        raise SessionError(f"this worker has code {code_digest()}, must be {code}")
+    check_code(code, code_digest)
     load_own_parts(_written(parts))
     return [compute(point, metrics, None) for point in points]
 
