@@ -12,7 +12,7 @@ from teleop_drill.simulation.drilled_session import DrilledSession
 
 _ANSWERED = 1.0
 """Longest time until a command is answered [s]."""
-_PAUSED = 0.3
+_PAUSED = 0.15
 """Longest time until an arm pauses after an outage that is too long [s]; the same time must have passed since."""
 _STILL = 0.04
 """Shortest rest of the setpoint before an arm becomes ENABLED [s]; the arm itself rests for somewhat longer."""
