@@ -201,9 +201,9 @@ def add_nine(store: Store) -> None:
 KILLED = """
 import os, sys
 from pathlib import Path
-sys.path.insert(0, sys.argv[1])
+sys.path[:0] = sys.argv[2:]
 from test_search import Store, add_nine
-folder = Path(sys.argv[2])
+folder = Path(sys.argv[1])
 add_nine(Store(folder, lambda: 0.0))
 with open(folder / "counts_since.jsonl", "a") as file:
     file.write('{"number": 9, "times"')
@@ -217,7 +217,7 @@ def test_a_search_that_is_killed_loses_no_schedule_that_had_ended(tmp_path: Path
     whole, folder = Store(tmp_path / "whole"), tmp_path / "killed"
     add_nine(whole)
     whole.save()
-    given = [sys.executable, "-c", KILLED, str(Path(__file__).parent), str(folder)]
+    given = [sys.executable, "-c", KILLED, str(folder), *sys.path]
     assert subprocess.run(given, check=False).returncode == -signal.SIGKILL
     assert json.loads((folder / "counts.json").read_text(encoding="utf-8"))["sessions"] == 1
     again = Store(folder)
