@@ -2,6 +2,7 @@
 
 import json
 import os
+import pickle
 import shlex
 import signal
 import subprocess
@@ -191,20 +192,21 @@ def test_a_schedule_that_broke_a_law_is_kept_though_it_met_nothing_new(tmp_path:
     assert store.lines()[-1] == "schedule_000000.json breaks stop"
 
 
-def add_nine(store: Store) -> None:
-    """Add nine results; a third of them meets something first."""
-    for k in range(9):
-        name = ("press_in_FAULT", "kill_in_PAUSED", "press_in_none")[k // 3]
-        store.add(met(Schedule(k, draw(k, SIDES)), kill_in_FAULT=1, **{name: 1}), [f"slave.py:{k // 3}"])
+def nine() -> list[tuple[Found, list[str]]]:
+    """Nine results, each with its branches; a third of them meets something first."""
+    names = ("press_in_FAULT", "kill_in_PAUSED", "press_in_none")
+    results = (met(Schedule(k, draw(k, SIDES)), kill_in_FAULT=1, **{names[k // 3]: 1}) for k in range(9))
+    return [(found, [f"slave.py:{k // 3}"]) for k, found in enumerate(results)]
 
 
 KILLED = """
-import os, sys
+import os, pickle, sys
 from pathlib import Path
-sys.path.insert(0, sys.argv[1])
-from test_search import Store, add_nine
-folder = Path(sys.argv[2])
-add_nine(Store(folder, lambda: 0.0))
+from teleop_drill.simulation.store import Store
+folder = Path(sys.argv[1])
+store = Store(folder, lambda: 0.0)
+for found, branches in pickle.load(sys.stdin.buffer):
+    store.add(found, branches)
 with open(folder / "counts_since.jsonl", "a") as file:
     file.write('{"number": 9, "times"')
     file.flush()
@@ -215,10 +217,11 @@ with open(folder / "counts_since.jsonl", "a") as file:
 def test_a_search_that_is_killed_loses_no_schedule_that_had_ended(tmp_path: Path) -> None:
     """All counts are written seldom; lines of the schedules since then stand beside them."""
     whole, folder = Store(tmp_path / "whole"), tmp_path / "killed"
-    add_nine(whole)
+    for found, branches in nine():
+        whole.add(found, branches)
     whole.save()
-    given = [sys.executable, "-c", KILLED, str(Path(__file__).parent), str(folder)]
-    assert subprocess.run(given, check=False).returncode == -signal.SIGKILL
+    given = [sys.executable, "-c", KILLED, str(folder)]
+    assert subprocess.run(given, check=False, input=pickle.dumps(nine())).returncode == -signal.SIGKILL
     assert json.loads((folder / "counts.json").read_text(encoding="utf-8"))["sessions"] == 1
     again = Store(folder)
     assert (again.coverage, again.times, again.kept) == (whole.coverage, whole.times, whole.kept)

@@ -46,3 +46,12 @@ def test_a_message_of_another_form_ends_the_row_of_steps() -> None:
     reader.add(form.encode_one(0, robot.home))
     assert (first := reader.steps()) is not None
     assert first.number == 0
+
+
+def test_a_setpoint_that_is_not_a_number_is_infinitely_fast() -> None:
+    robot = load_robot("rcrt1")
+    form = layout(SLAVE_SETPOINT_JS, robot.joint_names)
+    reader = StepReader(form, robot)
+    reader.add(form.encode_one(0, robot.home * np.nan))
+    assert (found := reader.steps()) is not None
+    assert np.isinf([*found.joints, found.tip]).all()

@@ -12,8 +12,10 @@ from teleop_drill.simulation.drilled_session import DrilledSession
 
 _ANSWERED = 1.0
 """Longest time until a command is answered [s]."""
-_PAUSED = 0.3
+_PAUSED = 0.15
 """Longest time until an arm pauses after an outage that is too long [s]; the same time must have passed since."""
+_STILL = 0.04
+"""Shortest rest of the setpoint before an arm becomes ENABLED [s]; the arm itself rests for somewhat longer."""
 _ENABLED, _PAUSED_STATE, _FAULT = int(State.ENABLED), int(State.PAUSED), int(State.FAULT)
 _FOLLOWING = int(MotionSource.FOLLOWING)
 
@@ -41,7 +43,7 @@ class Changes:
     def begin(self) -> None:
         """Begin with another slave."""
         self._due: dict[int, float] = {}  # from when on each held button must keep the arm stopped
-        self._state, self._was_homing, self._broke_off = -1, False, False
+        self._state, self._was_homing, self._broke_off, self._moved_at = -1, False, False, -math.inf
         self._silent = self._stood = 0.0
         self._leave_by = math.inf
 
@@ -79,12 +81,17 @@ class Changes:
         before, after = self._state, int(state["state"])
         was_homing, self._was_homing = self._was_homing, bool(state["is_homing"])
         self._state = after
+        still = self._now - self._moved_at
+        if state["step"].any():
+            self._moved_at = self._now
         if before in {-1, after}:
             return
         self._count("asked")
         change = f"{State(before).name} became {State(after).name}"
         if after == _ENABLED and not self._was_asked("enable", "resume"):
             self._tell("asked", f"{change} without a command")
+        if after == _ENABLED and still < _STILL:
+            self._tell("asked", f"{change} before it was at rest")
         if after == _PAUSED_STATE:
             self._broke_off = was_homing
         is_resumed = (before, after) == (_PAUSED_STATE, _ENABLED) and not self._was_asked("enable", "unhome")

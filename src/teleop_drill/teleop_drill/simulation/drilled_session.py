@@ -90,6 +90,8 @@ class DrilledSession:
         self._publishers: dict[str, Any] = {}
         self.sometimes: Counter[str] = Counter()
         """How often each event of :mod:`sometimes` was met."""
+        self.is_alone = True
+        """Whether nobody but the drill and the session sends commands."""
         self.asked: list[str] = []
         """Commands that were sent, in their order."""
         self.driven_ns = 0

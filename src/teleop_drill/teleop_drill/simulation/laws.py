@@ -201,7 +201,7 @@ class Laws:
         if wrong := self._owner.judge(process, stamp_ns, is_driven=is_driven):
             self._break("owner", wrong)
         age_ns = self._scheduler.now_ns - self._stage.driven_ns
-        if is_driven and not self._was_driven and age_ns > _OLDEST_NS:
+        if is_driven and not self._was_driven and age_ns > _OLDEST_NS and self._stage.is_alone:
             self._break("age", f"follows a speed command, although the last one is {1e-9 * age_ns:.1f} s old")
         self._was_driven = is_driven
         self._stage.commanded_ns = self._owner.followed_ns
@@ -211,7 +211,7 @@ class Laws:
         now_ns, before_ns, self._followed_ns = self._scheduler.now_ns, self._followed_ns, self._owner.followed_ns
         if self._followed_ns - before_ns > 1e9 * _OLD:
             is_new = self._worked - self._since < 1.5 * _OLD  # otherwise the hand may have led on behind a bad line
-            is_hand = self._owner.leader not in self._stage.senders
+            is_hand = self._stage.is_alone and self._owner.leader not in self._stage.senders
             self._engaged = (now_ns, self._tip(data)) if is_new and is_hand and self._is_quiet() else None
         if self._engaged is None or now_ns - self._engaged[0] < _ENGAGING_NS:
             return
@@ -266,7 +266,7 @@ class Laws:
         if self._scheduler.now_ns - self._stepped_ns < _AFTER_STEP_NS:
             return
         self._count("age")
-        if is_back:
+        if is_back and self._stage.is_alone:
             older = 1e-6 * (before_ns - stamp_ns)
             self._break("age", f"follows a command that is {older:.0f} ms older than the one before")
         master: Any = self._stage.session.node("haptic_master")
@@ -297,7 +297,8 @@ class Laws:
         elif works and process is not None:
             self._worked += 1e-9 * _LOOK_NS
             silence = 1e-9 * (self._scheduler.now_ns - self._owner.followed_ns)
-            self._changes.judge(slave, self._worked, self._late(), silence)
+            if self._stage.is_alone:
+                self._changes.judge(slave, self._worked, self._late(), silence)
             self._judge_state(slave)
             self._judge_stop(slave, process)
         self._judge_ends()
@@ -315,7 +316,7 @@ class Laws:
         if self._stage.driven_ns != self._drive_ns:
             self._drive_ns, self._driven_at = self._stage.driven_ns, self._worked
         undriven = self._worked - self._driven_at - self._numbers.command_timeout - self._braking - self._late()
-        is_undriven = self._was_driven and undriven > _REST
+        is_undriven = self._was_driven and undriven > _REST and self._stage.is_alone
         if self._has_moved and (is_undriven or (state != State.ENABLED and in_force > self._braking + 0.2)):
             self._has_moved = False
             self._judge_speed()
@@ -357,7 +358,7 @@ class Laws:
             self._obey_by = self._worked + (_OBEY if is_sent else _DOUBT)
             self._changes.hold(button, self._obey_by)
         is_over = not is_sent and self._was_idle and button not in stage.held
-        if is_over or operation["is_stopped"] or operation["is_pressed"]:
+        if is_over or operation["is_stopped"]:
             self._press = None
         elif self._worked > self._obey_by + self._late():
             self._press = None

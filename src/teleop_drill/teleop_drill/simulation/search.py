@@ -32,6 +32,8 @@ _MOST = 30
 """Largest number of faults of a schedule."""
 _FRESH = 0.4
 """Share of schedules that are drawn anew; the others are bred from kept ones."""
+_LONG = 0.2
+"""Share of faults that last about as long as the longest outage after which an arm goes on by itself."""
 _AHEAD = 4
 """A schedule is chosen when all but this many before it are known, so that the number of cores changes nothing."""
 _AHEAD_OF_CLUSTER = 32
@@ -114,7 +116,8 @@ class Search:
         seconds = [*range(int(BEGIN), int(_END))]
         (second,) = random.choices(seconds, [1.0 / (1.0 + self._moments[kind, one]) for one in seconds])
         where = random.choice(PROCESSES[processes]) if kind in OF_PROCESS else ""
-        lasts = min(3.0, random.expovariate(1.0)) + (4.5 if kind == "slow turns" else 0.0)
+        lasts = random.uniform(2.0, 3.0) if random.random() < _LONG else min(3.0, random.expovariate(1.0))
+        lasts += 4.5 if kind == "slow turns" else 0.0
         return Fault(second + random.random(), kind, where, lasts, random.random())
 
     # -- bred ------------------------------------------------------------------------------------

@@ -232,6 +232,7 @@ class _Run:
         self._visitor: Visitor | None = None
         try:
             if kind.is_visited:
+                self._stage.is_alone = False
                 self._visit(made)
             self._stage.session.start()
             self._laws.judge_recovery(self._await(_START), _START)

@@ -56,6 +56,9 @@ class StepReader:
             self._last = None
             return None
         q = self._form.decode(rows)[1][:, : self._robot.n]
+        if not np.isfinite(q).all():  # a setpoint that is not a number is infinitely fast
+            self._last = None
+            return Steps(len(q), np.full(self._robot.n, np.inf), np.inf, self._robot.home)
         tips = self._robot.fk(q)[:, :3, 3]
         if self._last is not None:
             q, tips = np.vstack((self._last[0], q)), np.vstack((self._last[1], tips))
