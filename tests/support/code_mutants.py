@@ -25,7 +25,8 @@ def _mutant(name: str, text: str, file: str, before: str, after: str, *tests: st
     return Mutant(name, text, ((file, before, after),), files)
 
 
-_CALLS = "tests/unit/refusals/test_calls.py"
+_CALLS, _FILES, _RECORDINGS, _ROBOT_FILES = (
+    f"tests/unit/refusals/test_{name}.py" for name in ("calls", "files", "recordings", "robot_files"))  # fmt: skip
 _BUTTON = "slave/world/button.py"
 _CONTACT, _PUNCTURE = "slave/world/contact.py", "slave/world/puncture.py"
 _SCALING, _LINK = "coupling/mapping/motion_scaling.py", "coupling/network/link.py"
@@ -779,7 +780,7 @@ CODE_MUTANTS = (
     _mutant("for_ever", "a start that gets no further is waited for", "nodes/starter.py",
             "time.monotonic() - self._last > self._patience", "time.monotonic() < 0.0", "starter"),
     _mutant("aliases_multiply", "a file may stand for any number of values", "base/plain_yaml.py",
-            "        _count(loader, node, {}, set())\n", "", "launching"),
+            "        _count(loader, node, {}, set())\n", "", _FILES),
     _mutant("pressed_early", "a press is offered before the arm follows, which counts for nothing",
             "teleop_console/status.py", "    return follows and (", "    return (",
             "console_status"),
@@ -809,11 +810,11 @@ CODE_MUTANTS = (
     _mutant("force_any", "a broken sensor's force is given to the hand", "hand/master/haptic_master.py",
             "if not square <= p.force_range * p.force_range:", "if False:", "force_range"),
     _mutant("last_key_wins", "of a key that stands twice in a file the last one is taken", "base/plain_yaml.py",
-            "        _check_keys(loader, node)\n", "", "configuration"),
+            "        _check_keys(loader, node)\n", "", _FILES),
     _mutant("last_node_wins", "of a node that stands twice in a file the last one is taken", "graph/layers.py",
-            "            _check_once(full, key, given, where)\n", "", "configuration"),
+            "            _check_once(full, key, given, where)\n", "", _FILES),
     _mutant("nested_deep", "a file may be nested deeper than the reader's stack bears",
-            "base/plain_yaml.py", "        _check_depth(text)\n", "", "launching"),
+            "base/plain_yaml.py", "        _check_depth(text)\n", "", _FILES),
     _mutant("form_reads", "the form reads files for a page that may not begin", "teleop_console/start.py",
             "self._shown(query if self._drivers.may_drive(page) else {})", "self._shown(query)", "console_start"),
     _mutant("form_opens", "the form evaluates any robot that is named before Start",
@@ -825,7 +826,9 @@ CODE_MUTANTS = (
             "if ROBOTS.is_symlink() or file.is_symlink():", "if False:", "console_start"),
     _mutant("xacro_quotes", "an error of a xacro quotes a file that it loads", "robots/files/xacro_process.py",
             'raise ParameterError("load_yaml", name, f"a file of YAML{line}") from None', "raise",
-            "xacro_files"),
+            _ROBOT_FILES),
+    _mutant("bag_led_out", "metadata of a recording lead to files outside of it", "bags/finding.py",
+            "plain = [Path(name).name for name in names]", "plain = list(names)", _RECORDINGS),
     _mutant("order_undoubted", "a wrong order of a quaternion is not noticed", "teleop_exchange/orientation.py",
             "if self.kind != \"quaternion\" or as_read > _OVER or other < _UPRIGHT:", "if True:", "import_given"),
     _mutant("goal_unframed", "the view of the work leaves a goal far away out", "teleop_console/arm_nodes.py",

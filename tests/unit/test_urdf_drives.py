@@ -9,7 +9,6 @@ import yaml
 
 import teleop_core as tc
 from present import present
-from teleop_core.base.errors import ParameterError, RecordingError, UnknownNameError
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import drives, load_robot
 
@@ -57,25 +56,6 @@ def test_a_motor_adds_its_inertia_to_that_of_the_links_in_either_model(tmp_path:
             return np.linalg.inv(np.array(rows))
 
         np.testing.assert_allclose(inertia(found) - inertia(plain), np.diag(motors), atol=1e-9, err_msg=dynamics)
-
-
-WRONG = {
-    "joint": ("wrist: {inertia: 1.0}", UnknownNameError, "drives joint is 'wrist'.* waist, "),
-    "entry": ("waist: {inertai: 1.0}", UnknownNameError, "waist entry is 'inertai'.* inertia, "),
-    "number": ("waist: {inertia: big}", ParameterError, "drives waist inertia is 'big'"),
-    "negative": ("waist: {coulomb: -1}", ParameterError, "drives waist coulomb is -1.*>= 0"),
-    "zero": ("waist: {effort_limit: 0}", ParameterError, "drives waist effort_limit is 0.*> 0"),
-    "list": ("[waist]", ParameterError, "a mapping from joint names"),
-    "stiff": ("waist: {inertia: 1e-4, coulomb: 9000}", ParameterError, "raise inertia or friction"),
-    "no yaml": ("{", RecordingError, "drives.yaml"),
-}
-
-
-@pytest.mark.parametrize(("content", "kind", "told"), WRONG.values(), ids=WRONG)
-def test_a_mistake_is_told_in_one_line(content: str, kind: type[tc.TeleopError], told: str, tmp_path: Path) -> None:
-    with pytest.raises(kind, match=told) as caught:
-        arm(tmp_path, content)
-    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("is_gone", [False, True])

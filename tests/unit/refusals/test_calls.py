@@ -41,8 +41,10 @@ from teleop_core.shapes.capsule import CapsuleParameters
 from teleop_core.shapes.cone import ConeParameters
 from teleop_core.shapes.cylinder import CylinderParameters
 from teleop_core.shapes.half_space import HalfSpaceParameters
+from teleop_core.shapes.height_field import HEIGHT_FIELD, HeightFieldParameters
 from teleop_core.shapes.hole import HoleParameters
 from teleop_core.shapes.line import LineParameters
+from teleop_core.shapes.mesh import MESH, MeshParameters
 from teleop_core.shapes.path import PathParameters
 from teleop_core.shapes.plane import PlaneParameters
 from teleop_core.slave.bridges.jaw_bridge import JawBridgeParameters
@@ -237,6 +239,8 @@ CASES = [
     (partial(Delay.parse, "=0.1"), "^teleop.delays is '=0.1'"),
     *of(RecordingParameters, "topic=n", every_of=("slave/measured_js",)),
     *of(RecordingParameters, "topic=n", every_of=("slave/measured_js=0",)),
+    *((partial(part.numbers, group), rf"^{part.name}\.file is.*a file with")
+      for part, group in ((HEIGHT_FIELD, HeightFieldParameters()), (MESH, MeshParameters()))),
     # the console
     *((partial(Guard, 8080, token), "token") for token in ("", "two words", "a;b", "a&b", "a=b", "ä", 'a"b', "a\nb")),
     *((partial(listen, "127.0.0.1", port), f"^port is {port}") for port in (65536, -1)),
