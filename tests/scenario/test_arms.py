@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 import teleop_core as tc
 from teleop_core.bags.reader import Bag
-from teleop_core.base.errors import TeleopError
 from teleop_core.graph.layers import parse_layer
 from teleop_core.graph.topics import STREAMS
 from teleop_core.session import runner, virtual
@@ -87,23 +86,6 @@ def test_text_of_two_arms_reads_back_the_same() -> None:
     configuration = settings(*ARMS)
     layer = parse_layer(yaml.safe_load(configuration.text()), "text")
     assert Configuration.from_layers([layer]) == configuration
-
-
-@pytest.mark.parametrize(
-    ("more", "says"),
-    [
-        (("teleop.arms=[left, left]",), "left"),
-        (("teleop.arms=[right, 'left arm']",), "left arm"),
-        (("teleop.arms=[right, left]", "middle/seed=3"), "right, left"),
-        (("left/seed=3",), "left"),
-        (("teleop.arms=[right, left]", "left/slave_sim.robot=mma"), "left/inverse_kinematics"),
-        (("teleop.arms=[right, left]", "teleop.delays=[up/slave/servo_jp=0.1]"), "left/slave/servo_jp"),
-    ],
-)
-def test_wrong_arms_are_refused_in_one_line_before_anything_runs(more: tuple[str, ...], says: str) -> None:
-    with pytest.raises(TeleopError, match=says) as error:
-        settings(*more)
-    assert "\n" not in str(error.value)
 
 
 @pytest.mark.slow

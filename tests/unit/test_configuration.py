@@ -21,12 +21,6 @@ def test_scenario_builds_every_group_and_says_what_it_is(name: str) -> None:
     assert set(configure(name).groups) == {layers.SESSION, *BUILT_IN, RECORDER_NAME}
 
 
-def test_unknown_scenario_is_refused_with_the_scenarios() -> None:
-    with pytest.raises(UnknownNameError) as error:
-        configure("coarse")
-    assert set(SCENARIOS) <= set(error.value.alternatives)
-
-
 def test_default_file_changes_no_default_of_the_code() -> None:
     defaults = Configuration.from_layers([])
     assert configure().groups == defaults.groups

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from random_arms import table
-from teleop_core.base import errors
 from teleop_core.kernels.geometry import Array, rotation, transform
 from teleop_core.robots import IkStatus, load_robot
 from teleop_core.robots.arms.dh import load_table
@@ -101,11 +100,3 @@ def test_signs_offsets_limits_and_homes_are_read_in_the_table_unit() -> None:
     assert slide.home == pytest.approx(0.3)
     pose = chain.robot().fk([math.radians(30.0), 0.3])
     assert np.abs(pose - transform(np.eye(3), np.array([0.2, 0.0, 0.2]))).max() < ROUNDING
-
-
-def test_joint_vectors_of_another_length_are_refused() -> None:
-    chain = table([{"theta": "q"}])
-    with pytest.raises(errors.ShapeError):
-        chain.link_transforms([0.0, 1.0])
-    with pytest.raises(errors.ParameterError):
-        chain.link_transforms([math.nan])

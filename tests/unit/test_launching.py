@@ -9,7 +9,6 @@ from typing import Any
 import pytest
 import yaml
 
-from teleop_core.base.errors import ParameterError
 from teleop_core.nodes.launching import COMMON, ONE_ARM, TWO_ARMS, LaunchedProcess, processes
 from teleop_core.nodes.start import taken_names
 
@@ -76,12 +75,6 @@ def test_a_robot_is_that_of_all_stages_of_its_arm() -> None:
     assert two["/slave_sim"]["robot"] == "rcrt1"
     assert two["/right/slave_sim"]["robot"] == "puma560"
     assert sum(process.namespace == "/right" for process in both) == len(STAGES)
-
-
-@pytest.mark.parametrize(("name", "value"), [("log_level", "loud"), ("record", "perhaps"), ("processes", "")])
-def test_an_argument_of_no_meaning_is_refused(name: str, value: str) -> None:
-    with pytest.raises(ParameterError, match=name):
-        processes(given(**dict[str, Any]({name: value})))
 
 
 @pytest.mark.parametrize(("file", "own", "count"), [("teleop", ONE_ARM, 8), ("two_arms", TWO_ARMS, 14)])

@@ -10,7 +10,7 @@ import pytest
 import teleop_core as tc
 from present import present
 from teleop_core.bags.reader import Bag
-from teleop_core.base import ParameterError, TeleopError
+from teleop_core.base import TeleopError
 from teleop_core.graph import topics
 from teleop_core.session.virtual import VirtualTime
 
@@ -162,16 +162,6 @@ def test_an_unstable_scene_ends_the_session_in_one_line_and_keeps_its_recording(
     assert "\n" not in str(told.value)
     assert "wild" in str(told.value)
     assert len(Bag(tmp_path / "bag").read("slave/measured_js").values) == 1000  # the first block, before it
-
-
-def test_a_world_of_ours_beside_a_scene_is_refused() -> None:
-    with pytest.raises(ParameterError, match="has a world"):
-        session("cubes.xml", scenario="palpation")
-
-
-def test_the_plant_scene_is_refused_for_another_robot() -> None:
-    with pytest.raises(ParameterError, match=r"robot=SCENE\.xml"):
-        session("rcrt1", plant="scene")
 
 
 FLOOR = """<mujoco><worldbody><geom type="plane" size="1 1 1" pos="0 0 0.987" solref="-2000 -60"/>
