@@ -25,8 +25,9 @@ def _mutant(name: str, text: str, file: str, before: str, after: str, *tests: st
     return Mutant(name, text, ((file, before, after),), files)
 
 
-_CALLS, _FILES, _RECORDINGS, _ROBOT_FILES = (
-    f"tests/unit/refusals/test_{name}.py" for name in ("calls", "files", "recordings", "robot_files"))  # fmt: skip
+_CALLS, _FILES, _PARTS, _RECORDINGS, _ROBOT_FILES = (
+    f"tests/unit/refusals/test_{name}.py" for name in ("calls", "files", "parts", "recordings", "robot_files")
+)
 _BUTTON = "slave/world/button.py"
 _CONTACT, _PUNCTURE = "slave/world/contact.py", "slave/world/puncture.py"
 _SCALING, _LINK = "coupling/mapping/motion_scaling.py", "coupling/network/link.py"
@@ -121,7 +122,7 @@ CODE_MUTANTS = (
             "if trial.repetition and ", "if ", "people"),
     _mutant("beyond_numbers", "a task that reads beyond its parameters works at what stands there",
             "hand/tasks/__init__.py", "numbers, _ = fenced(part.numbers(part.parameters()))",
-            "numbers = part.numbers(part.parameters())", "part_mistakes"),
+            "numbers = part.numbers(part.parameters())", _PARTS),
     _mutant("own_code_old", "results stay where a measure of one's own was changed", "teleop_lab/studies/study.py",
             "code_digest() + own_digest()", "code_digest()", "studies"),
     _mutant("own_part_old", "a file of parts that was changed is not run again", "base/own_parts.py",
@@ -202,7 +203,7 @@ CODE_MUTANTS = (
     _mutant("one_live_over", "a live session ends once one of two arms has no goal left", "nodes/task_end.py",
             "_OVER] > 0.0).all()", "_OVER] > 0.0).any()", "tests/simulated/test_task_end.py"),
     _mutant("task_uncounted", "a task that counts nothing is taken", "hand/tasks/__init__.py",
-            "if not done and act", "if False and act", "part_mistakes"),
+            "if not done and act", "if False and act", _PARTS),
     _mutant("scores_unwritten", "a study may ask for scores of what no session writes",
             "teleop_lab/studies/checks.py", "if reads and not written.intersection(reads):", "if False:", _CALLS),
     _mutant("place_unreached", "a study may have an object that the slave cannot touch",
