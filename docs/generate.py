@@ -77,7 +77,7 @@ A parameter has one declaration, and one name on its way from a file to the kern
 
 Steps 1 and 2 hold plain mappings, of stage and dotted name to an unchecked value. A layer gives some values of a group,
 and merging must know which ones. A typed layer would need a second class of every group, in which each field may be
-missing. Types begin with `build`, because a relation such as `fine_gain <= coarse_gain` holds for the merged values alone.
+missing. Types begin with `build`, because `fine_gain <= coarse_gain` concerns the merged values alone.
 
 A stage's function `derive` writes the few numbers that follow from several parameters, from the robot or from the
 length of a tick. [Records and kernels](records_and_kernels.md) has the rules.
