@@ -63,7 +63,7 @@ VALUES = {
 WAY = """## From a file to a kernel
 
 A parameter has one declaration, and one name on its way from a file to the kernel that uses it. Here the way of
-`motion_scaling.fixture.damping`; an editor follows each step by the type.
+`motion_scaling.fixture.damping`, through five files. From step 3 on, an editor follows it by the type.
 
 | step | where | what it holds |
 |---|---|---|
@@ -74,6 +74,10 @@ A parameter has one declaration, and one name on its way from a file to the kern
 | 5 | `coupling/mapping/motion_scaling.py`, `MotionScaling.retune` | the record of the stage |
 | 6 | `base/parameters.py`, `fill` | the number in the record: `p.fixture.damping` |
 | 7 | `coupling/mapping/walls.py`, `damped_wall` | the kernel: `wall.damping` |
+
+Steps 1 and 2 hold plain mappings, of stage and dotted name to an unchecked value. A layer gives some values of a group,
+and merging must know which ones. A typed layer would need a second class of every group, in which each field may be
+missing. Types begin with `build`, because `fine_gain <= coarse_gain` concerns the merged values alone.
 
 A stage's function `derive` writes the few numbers that follow from several parameters, from the robot or from the
 length of a tick. [Records and kernels](records_and_kernels.md) has the rules.

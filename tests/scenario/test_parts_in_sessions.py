@@ -1,7 +1,6 @@
 """What a session tells of parts of one's own: NaN, misspelt fields, answers that nobody reads."""
 
 import json
-import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -92,25 +91,6 @@ def test_file_of_parts_takes_what_stands_beside_it_before_and_after_the_command(
         listed = teleop_again(*arguments).stdout.split()
         assert {"own", "still"} <= {name.strip(",") for name in listed}
         assert {"tremor_filters", "world_objects", "metrics"} <= set(listed)
-
-
-@pytest.mark.parametrize(
-    ("text", "told"),
-    [
-        ("x = 1\n\ny = x / 0\n", r"ZeroDivisionError: division by zero \(line 3\)"),
-        ("import json\njson.loads('{')\n", r"JSONDecodeError: .* \(line 2\)"),
-        ("import nothing_of_this_name\n", r"ModuleNotFoundError: .* \(line 1\)"),
-        ("x = (\n", r"SyntaxError: .*line 1\)"),
-    ],
-)
-def test_file_of_parts_that_raises_is_told_with_its_line(
-    teleop_again: "Run", tmp_path: Path, text: str, told: str
-) -> None:
-    file = tmp_path / "wrong.py"
-    file.write_text(text)
-    (line,) = teleop_again("parts", "--parts", file, code=2).stderr.splitlines()
-    assert str(file) in line
-    assert re.search(told, line), line
 
 
 @pytest.mark.slow

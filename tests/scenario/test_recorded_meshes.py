@@ -145,22 +145,6 @@ def test_a_mesh_that_is_touched_is_kept_before_those_that_are_only_looked_at(
     assert kept(recording.metadata) == [recording.metadata["mesh_file"]]
 
 
-@pytest.mark.slow
-def test_each_of_two_arms_of_one_xacro_is_replayed_with_its_own_arguments(tmp_path: Path) -> None:
-    path = tmp_path / "arm.xacro"
-    path.write_text(
-        URDF.replace("<robot ", '<robot xmlns:xacro="http://www.ros.org/wiki/xacro" ')
-        .replace('<link name="base"/>', '<link name="base"/><xacro:arg name="lift" default="0.4"/>')
-        .replace('xyz="0 0 0.42"', 'xyz="0 0 $(arg lift)"')
-    )
-    settings = {"right/geometry": ["tip=tool0", "xacro.lift=0.5"]}
-    recording = recorded(tmp_path, path, arms=["left", "right"], settings=settings)
-    before = [recording[f"{arm}slave/measured_cp"].values for arm in ("", "right/")]
-    after = tc.replay(present(recording.path))
-    for name, values in zip(("", "right/"), before, strict=True):
-        np.testing.assert_array_equal(after[f"{name}slave/measured_cp"].values, values)
-
-
 @pytest.mark.parametrize(
     "packed", ["", "x", "zlib, base64: x", "zlib, base64: " + base64.b64encode(zlib.compress(b"another")).decode()]
 )

@@ -1,8 +1,7 @@
 """Robots from files in recordings: what is replayed and scored is the arm that moved."""
 
 import re
-import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -10,24 +9,11 @@ import numpy as np
 import pytest
 
 import teleop_core as tc
-from present import present
 from teleop_core.bags import arms, kept_files
 from teleop_core.base.errors import ParameterError
-from teleop_core.kernels.geometry import Array
 from teleop_core.session.runner import recorded_configuration
 
 URDF = (Path(__file__).parents[2] / "examples" / "any_arm.urdf").read_text()
-TABLE = """
-name: my_scara
-convention: modified
-angles: degrees
-task: [x, y, z, rz]
-rows:
-  - {theta: q, lower: -150, upper: 150, home: -45}
-  - {a: 0.4, theta: q, lower: -150, upper: 150, home: 90}
-  - {a: 0.3, d: -q, lower: 0.0, upper: 0.2, home: 0.1}
-  - {theta: q}
-"""
 XACRO = (
     URDF.replace("<robot ", '<robot xmlns:xacro="http://www.ros.org/wiki/xacro" ')
     .replace(
@@ -35,79 +21,30 @@ XACRO = (
     )
     .replace('xyz="0 0 0.42"', 'xyz="0 0 ${0.4 + $(arg lift)}"')
 )
-ROBOTS = {
-    "arm.urdf": (URDF, ["tip=tool0"]),
-    "scara.yaml": (TABLE, []),
-    "arm.xacro": (XACRO, ["tip=tool0", "xacro.lift=0.05"]),
-}
-
-
-def gone(path: Path) -> None:
-    path.unlink()
 
 
 def longer(path: Path) -> None:
     path.write_text(re.sub(r"\b0\.(3|4)\b", r"0.\g<1>3", path.read_text()))
-    assert path.read_text() not in (URDF, TABLE, XACRO)
+    assert path.read_text() != URDF
 
 
-def no_text(path: Path) -> None:
-    path.write_bytes(b"\xff\xfe<robot/>")
-
-
-def recorded(
-    folder: Path, name: str, **more: list[str] | Mapping[str, str | list[object]]
-) -> tuple[tc.Recording, Path]:
-    """Recording of a session with a robot of a file, and that file."""
-    text, geometry = ROBOTS[name]
-    path = folder / name
-    path.write_text(text)
-    options: dict[str, Any] = {"robot": str(path), "geometry": geometry, **more}
+def recorded(folder: Path, **more: list[str] | Mapping[str, str | list[object]]) -> tuple[tc.Recording, Path]:
+    """Recording of a session with the robot of a URDF, and that file."""
+    path = folder / "arm.urdf"
+    path.write_text(URDF)
+    options: dict[str, Any] = {"robot": str(path), "geometry": ["tip=tool0"], **more}
     return tc.run("coarse_box", duration=0.6, out=folder / "bag", **options), path
-
-
-def replayed(bag: Path, prefix: str = "") -> Array:
-    return tc.replay(bag)[f"{prefix}slave/setpoint_js"].values
-
-
-@pytest.mark.parametrize(
-    ("name", "becomes"), [("arm.urdf", gone), ("arm.urdf", no_text), ("scara.yaml", longer), ("arm.xacro", longer)]
-)
-def test_a_session_replays_to_the_bit_whatever_became_of_the_file_of_its_robot(
-    name: str, becomes: Callable[[Path], None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    recording, path = recorded(tmp_path, name)
-    before = replayed(present(recording.path))
-    becomes(path)
-    monkeypatch.setitem(sys.modules, "xacro", None)  # as where it is not installed
-    np.testing.assert_array_equal(replayed(present(recording.path)), before)
-    again = tc.replay(present(recording.path), out=tmp_path / "again")  # which holds the arm as well
-    np.testing.assert_array_equal(replayed(present(again.path)), before)
-
-
-def test_each_of_two_arms_keeps_its_own_file(tmp_path: Path) -> None:
-    other = tmp_path / "other.urdf"
-    other.write_text(URDF)
-    longer(other)
-    right: Any = {"right/robot": str(other)}  # of the same kernels, which are compiled once
-    recording, path = recorded(tmp_path, "arm.urdf", arms=["left", "right"], settings=right)
-    before = replayed(present(recording.path)), replayed(present(recording.path), "right/")
-    assert not np.array_equal(*before)
-    path.unlink()
-    other.write_text(URDF)
-    for prefix, values in zip(("", "right/"), before, strict=True):
-        np.testing.assert_array_equal(replayed(present(recording.path), prefix), values)
 
 
 def test_an_arm_of_a_name_has_no_file_of_the_arm_beside_it(tmp_path: Path) -> None:
     right: Any = {"right/robot": "puma560", "right/geometry": []}
-    recording, path = recorded(tmp_path, "arm.urdf", arms=["left", "right"], settings=right)
+    recording, path = recorded(tmp_path, arms=["left", "right"], settings=right)
     assert kept_files.recorded_files(arms.of_arm(recording.bag, "left").metadata) == {str(path): str(path)}
     assert kept_files.recorded_files(arms.of_arm(recording.bag, "right").metadata) == {}
 
 
 def test_a_file_that_says_what_it_said_is_read_where_it_lies(tmp_path: Path) -> None:
-    recording, path = recorded(tmp_path, "arm.urdf")
+    recording, path = recorded(tmp_path)
     assert kept_files.recorded_files(recording.metadata) == {str(path): str(path)}
     assert recording.metadata["robot_file"] == URDF
     assert recorded_configuration(recording.bag)[0]["slave"]["robot"] == str(path)

@@ -1,7 +1,6 @@
 """Several nodes together: safe with bad input, deaths and restarts, equal to virtual time."""
 
 import signal
-from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -40,87 +39,10 @@ STEADY: dict[str, Any] = {
 }
 
 
-def test_poses_that_are_not_unit_or_not_finite_are_refused(peer: "Peer") -> None:
-    answers = peer.listen(topics.SLAVE_SERVO_JP)
-    peer.start("inverse_kinematics")
-    stamp = 0
-
-    def refuse(key: str, pose: Callable[..., object] | list[Any]) -> None:
-        nonlocal stamp
-
-        def refused() -> Any:
-            status = peer.status("inverse_kinematics")
-            return status and status.number(f"refused.slave/servo_cp.{key}") > 0
-
-        stamp = peer.feed(refused, key, {topics.SLAVE_SERVO_CP: pose}, {topics.SLAVE_SETPOINT_JS: HOME}, after=stamp)
-
-    refuse("not_unit", [0.4, 0.0, -0.2, 0.9, 0.0, 0.0, 0.0])
-    refuse("not_finite", [np.nan, 0.0, -0.2, 1.0, 0.0, 0.0, 0.0])
-    assert answers.take() == 0
-
-
 def drive(peer: "Peer", topic: Topic, wanted: Any, listener: "Listener", start: int | None = None) -> int:
     """Send a value until the slave's setpoints carry its stamp; returns that stamp."""
     in_force = lambda: listener.take() and listener.stamps[-1] > (start or topics.NO_COMMAND_NS)  # noqa: E731
     return peer.feed(in_force, "command in force", {topic: wanted}, after=start)
-
-
-def test_slave_refuses_bad_commands_and_holds(peer: "Peer") -> None:
-    setpoints = peer.listen(topics.SLAVE_SETPOINT_JS)
-    peer.start("slave")
-    wanted = HOME - 0.001 * np.eye(6)[0]
-
-    def there() -> bool:
-        return bool(setpoints.take()) and np.allclose(setpoints.values[-1], wanted, atol=1e-9)
-
-    last = peer.feed(there, "rest", {topics.SLAVE_SERVO_JP: wanted})
-    setpoints.forget()
-
-    def refuse(key: str, publish: Callable[..., object]) -> None:
-        """Publish until one more is refused for this reason."""
-        name = f"refused.slave/servo_jp.{key}"
-
-        def refused() -> Any:
-            nonlocal last
-            last += MS
-            publish(last)
-            status = peer.status("slave")
-            return status and status.number(name) > 0 and status.level == 1
-
-        peer.wait(refused, name)
-
-    near = HOME - 0.002 * np.eye(6)[0]
-    publisher = peer.publisher(topics.SLAVE_SERVO_JP)
-
-    def typed(names: list[Any] | tuple[str, ...], position: Any) -> Callable[..., object]:
-        def publish(stamp: int) -> None:
-            q = list(map(float, position))
-            message = JointState(name=list(names), position=q, velocity=[0.0] * len(q))
-            message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp, 10**9)
-            publisher.publish(message)
-
-        return publish
-
-    refuse("not_finite", lambda s: peer.send(topics.SLAVE_SERVO_JP, s, near * np.nan))
-    refuse("not_finite", lambda s: peer.send(topics.SLAVE_SERVO_JP, s, near + np.inf))
-    refuse("wrong_names", typed(["a", "b", "c", "d", "e", "f"], near))
-    refuse("wrong_length", typed(ROBOT.joint_names, near[:4]))
-    # So long without a good one is an outage, which may have paused the arm.
-    assert peer.call(Trigger, "/slave/resume", Trigger.Request()).success
-    setpoints.take()
-    last = max(setpoints.stamps)
-    good = drive(peer, topics.SLAVE_SERVO_JP, wanted, setpoints, last)
-
-    def backwards() -> Any:
-        peer.send(topics.SLAVE_SERVO_JP, good - MS, near)
-        status = peer.status("slave")
-        return status and status.number("refused.slave/servo_jp.not_newer") > 0
-
-    peer.wait(backwards, "refused stamp")
-    last = good + 10 * MS
-    refuse("jump", lambda s: peer.send(topics.SLAVE_SERVO_JP, s, HOME - 0.9 * np.eye(6)[0]))
-    setpoints.take()
-    assert np.abs(np.array(setpoints.values) - wanted).max() < 1e-7
 
 
 def test_another_frame_and_another_order_of_joints_give_the_same_motion(peer: "Peer") -> None:

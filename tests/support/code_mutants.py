@@ -26,7 +26,9 @@ def _mutant(name: str, text: str, file: str, before: str, after: str, *tests: st
     return Mutant(name, text, ((file, before, after),), files, past=past)
 
 
-_CALLS = "tests/unit/refusals/test_calls.py"
+_CALLS, _FILES, _PARTS, _RECORDINGS, _ROBOT_FILES = (
+    f"tests/unit/refusals/test_{name}.py" for name in ("calls", "files", "parts", "recordings", "robot_files")
+)
 _BUTTON = "slave/world/button.py"
 _CONTACT, _PUNCTURE = "slave/world/contact.py", "slave/world/puncture.py"
 _SCALING, _LINK = "coupling/mapping/motion_scaling.py", "coupling/network/link.py"
@@ -125,7 +127,7 @@ CODE_MUTANTS = (
             "if trial.repetition and ", "if ", "people"),
     _mutant("beyond_numbers", "a task that reads beyond its parameters works at what stands there",
             "hand/tasks/__init__.py", "numbers, _ = fenced(part.numbers(part.parameters()))",
-            "numbers = part.numbers(part.parameters())", "part_mistakes"),
+            "numbers = part.numbers(part.parameters())", _PARTS),
     _mutant("own_code_old", "results stay where a measure of one's own was changed", "teleop_lab/studies/study.py",
             "code_digest() + own_digest()", "code_digest()", "studies"),
     _mutant("own_part_old", "a file of parts that was changed is not run again", "base/own_parts.py",
@@ -206,7 +208,7 @@ CODE_MUTANTS = (
     _mutant("one_live_over", "a live session ends once one of two arms has no goal left", "nodes/task_end.py",
             "_OVER] > 0.0).all()", "_OVER] > 0.0).any()", "tests/simulated/test_task_end.py"),
     _mutant("task_uncounted", "a task that counts nothing is taken", "hand/tasks/__init__.py",
-            "if not done and act", "if False and act", "part_mistakes"),
+            "if not done and act", "if False and act", _PARTS),
     _mutant("scores_unwritten", "a study may ask for scores of what no session writes",
             "teleop_lab/studies/checks.py", "if reads and not written.intersection(reads):", "if False:", _CALLS),
     _mutant("place_unreached", "a study may have an object that the slave cannot touch",
@@ -785,7 +787,7 @@ CODE_MUTANTS = (
     _mutant("for_ever", "a start that gets no further is waited for", "nodes/starter.py",
             "time.monotonic() - self._last > self._patience", "time.monotonic() < 0.0", "starter"),
     _mutant("aliases_multiply", "a file may stand for any number of values", "base/plain_yaml.py",
-            "        _count(loader, node, {}, set())\n", "", "launching"),
+            "        _count(loader, node, {}, set())\n", "", _FILES),
     _mutant("pressed_early", "a press is offered before the arm follows, which counts for nothing",
             "teleop_console/status.py", "    return follows and (", "    return (",
             "console_status"),
@@ -815,11 +817,11 @@ CODE_MUTANTS = (
     _mutant("force_any", "a broken sensor's force is given to the hand", "hand/master/haptic_master.py",
             "if not square <= p.force_range * p.force_range:", "if False:", "force_range"),
     _mutant("last_key_wins", "of a key that stands twice in a file the last one is taken", "base/plain_yaml.py",
-            "        _check_keys(loader, node)\n", "", "configuration"),
+            "        _check_keys(loader, node)\n", "", _FILES),
     _mutant("last_node_wins", "of a node that stands twice in a file the last one is taken", "graph/layers.py",
-            "            _check_once(full, key, given, where)\n", "", "configuration"),
+            "            _check_once(full, key, given, where)\n", "", _FILES),
     _mutant("nested_deep", "a file may be nested deeper than the reader's stack bears",
-            "base/plain_yaml.py", "        _check_depth(text)\n", "", "launching"),
+            "base/plain_yaml.py", "        _check_depth(text)\n", "", _FILES),
     _mutant("form_reads", "the form reads files for a page that may not begin", "teleop_console/start.py",
             "self._shown(query if self._drivers.may_drive(page) else {})", "self._shown(query)", "console_start"),
     _mutant("form_opens", "the form evaluates any robot that is named before Start",
@@ -831,7 +833,14 @@ CODE_MUTANTS = (
             "if ROBOTS.is_symlink() or file.is_symlink():", "if False:", "console_start"),
     _mutant("xacro_quotes", "an error of a xacro quotes a file that it loads", "robots/files/xacro_process.py",
             'raise ParameterError("load_yaml", name, f"a file of YAML{line}") from None', "raise",
-            "xacro_files"),
+            _ROBOT_FILES),
+    _mutant("refusal_untold", "nobody tells that messages of a topic are refused", "nodes/diagnostics.py",
+            "            if new:\n                reasons", "            if False:\n                reasons",
+            "tests/simulated/test_refusals.py"),
+    _mutant("half_turn_taken", "a pose whose quaternion has another length is taken", "nodes/wire.py",
+            "            return _NOT_UNIT\n", "            pass\n", "tests/simulated/test_refusals.py"),
+    _mutant("bag_led_out", "metadata of a recording lead to files outside of it", "bags/finding.py",
+            "plain = [Path(name).name for name in names]", "plain = list(names)", _RECORDINGS),
     _mutant("order_undoubted", "a wrong order of a quaternion is not noticed", "teleop_exchange/orientation.py",
             "if self.kind != \"quaternion\" or as_read > _OVER or other < _UPRIGHT:", "if True:", "import_given"),
     _mutant("goal_unframed", "the view of the work leaves a goal far away out", "teleop_console/arm_nodes.py",
@@ -925,7 +934,8 @@ CODE_MUTANTS = (
     _mutant("zero_unmoved", "joints of a scene that begin at another value are taken as 0", "teleop_scene/chain.py",
             "zero = -sign * float(model", "zero = -0.0 * float(model", "scene_arm"),
     _mutant("scene_of_today", "a replay takes the changed files of a scene", "bags/kept_files.py",
-            "for at, file in now.items()} == recorded:", "for at, file in now.items()}:", "scene_session"),
+            "for at, file in now.items()} == recorded:", "for at, file in now.items()}:",
+            "tests/scenario/test_replays.py"),
     _mutant("scene_stands", "the bodies of a scene stand still on the page", "teleop_console/surrounding_nodes.py",
             "                move(frame, poses[place])\n", "                pass\n", "console_surroundings"),
     _mutant("given_twice", "the work of drives is counted with the other sign", "teleop_scene/scene.py",

@@ -1,6 +1,5 @@
 """Architectures: what the hand feels of the slave, by each law, and over a network."""
 
-from collections.abc import Callable
 from functools import partial
 from typing import Any
 
@@ -9,7 +8,7 @@ import pytest
 
 import teleop_core as tc
 from palpation import on_the_slave, pressed
-from teleop_core.base import PartError, build
+from teleop_core.base import build
 from teleop_core.coupling.mapping.gains import MotionScalingParameters
 from teleop_core.graph import STATE
 from teleop_core.kernels import kernel
@@ -91,17 +90,3 @@ def test_an_architecture_of_ones_own_is_one_call_and_remembers_twelve_numbers() 
     rows = pressing("reflection.architecture=counting", ticks=3000)
     force = on_the_slave(rows["master_servo_cf"])
     np.testing.assert_allclose(np.diff(force[1000:, 2]), 1e-5, rtol=1e-9)
-
-
-@pytest.mark.parametrize(
-    "wrong",
-    [
-        lambda n, m, f, a, t, out: out.fill(np.nan),
-        lambda n, m, f, out: None,
-        lambda n, m, f, a, t, out: m.base[12:].fill(0.0),  # behind what it may remember
-        lambda n, m, f, a, t, out: out.base[3:].fill(0.0),  # behind what it may write
-    ],
-)
-def test_an_architecture_that_cannot_work_is_refused_before_anything_runs(wrong: Callable[..., Any]) -> None:
-    with pytest.raises(PartError, match="architecture"):
-        tc.register_architecture(tc.Architecture("wrong", tc.NoParameters, wrong))

@@ -1,7 +1,6 @@
 """Reading recordings: ours, those of others, and what cannot be read."""
 
 import shutil
-import sqlite3
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -212,78 +211,6 @@ def test_raw_messages_are_those_of_the_chosen_topics(tmp_path: Path) -> None:
 # -- what cannot be read ---------------------------------------------------------------------------
 
 
-def refusal(path: Path) -> str:
-    with pytest.raises(RecordingError) as caught:
-        Bag(path).read_many(STREAMS)
-    assert "\n" not in str(caught.value)
-    assert str(caught.value).startswith(str(path))
-    return caught.value.reason
-
-
-def test_what_is_no_recording_is_refused_by_what_it_is(tmp_path: Path) -> None:
-    assert "does not exist" in refusal(tmp_path / "nothing")
-    assert "no .mcap file" in refusal(tmp_path)
-    (tmp_path / "bag.mcap").write_bytes(b"")
-    assert "empty" in refusal(tmp_path / "bag.mcap")
-    (tmp_path / "bag.mcap").write_bytes(b"#ROSBAG V2.0\n" * 20)
-    assert "no MCAP file" in refusal(tmp_path / "bag.mcap")
-    (ours(tmp_path / "bag") / "metadata.yaml").unlink()  # it was not finished
-    assert f"teleop recover {tmp_path / 'bag'}" in refusal(tmp_path / "bag")
-
-
-@pytest.mark.parametrize("kept", [0.01, 0.3, 0.9, 0.9999])
-def test_a_file_that_was_cut_off_points_to_recover(tmp_path: Path, kept: float) -> None:
-    file = ours(tmp_path / "bag") / "bag_0.mcap"
-    data = file.read_bytes()
-    file.write_bytes(data[: int(len(data) * kept)])
-    reason = refusal(file)
-    assert "cut off" in reason
-    assert "teleop recover" in reason
-
-
-def test_sqlite_recordings_are_refused_with_the_way_out(tmp_path: Path) -> None:
-    (tmp_path / "bag").mkdir()
-    database = sqlite3.connect(tmp_path / "bag" / "bag_0.db3")
-    database.execute("CREATE TABLE messages(id INTEGER)")
-    database.commit()
-    database.close()
-    assert "must be mcap" in refusal(tmp_path / "bag")
-    assert "SQLite" in refusal(tmp_path / "bag" / "bag_0.db3")
-
-
-def test_a_recording_without_messages_is_refused(tmp_path: Path) -> None:
-    with BagWriter(tmp_path / "bag", topics.ALL, JOINTS):
-        pass
-    assert "holds no messages" in refusal(tmp_path / "bag")
-    with another(tmp_path / "empty.mcap", "std_msgs/msg/String"):
-        pass
-    assert "holds no messages" in refusal(tmp_path / "empty.mcap")
-
-
-@pytest.mark.parametrize(
-    ("text", "expected"),
-    [
-        ("rosbag2_bagfile_information: [", "damaged"),
-        ("just text", "damaged"),
-        ("rosbag2_bagfile_information: {version: 9}", "damaged"),
-        ("rosbag2_bagfile_information: {relative_file_paths: [gone.mcap]}", "gone.mcap"),
-        ("rosbag2_bagfile_information: {relative_file_paths: [bag_0.mcap], compression_mode: MESSAGE}", "by 'message'"),
-    ],
-)
-def test_a_wrong_metadata_file_is_refused(tmp_path: Path, text: str, expected: str) -> None:
-    (ours(tmp_path / "bag") / "metadata.yaml").write_text(text)
-    assert expected in refusal(tmp_path / "bag")
-
-
-def test_missing_topics_are_listed_with_those_there_are(tmp_path: Path) -> None:
-    bag = Bag(ours(tmp_path / "bag"))
-    bag.require(STREAMS)
-    with pytest.raises(RecordingError) as caught:
-        bag.require([topics.SLAVE_SERVO_CP, topics.MASTER_BUTTONS, "scan"])
-    expected = "lacks slave/servo_cp, scan; it has master/buttons, slave/measured_cp, "
-    assert caught.value.reason.startswith(expected)
-
-
 def test_a_topic_of_another_type_counts_as_missing(tmp_path: Path) -> None:
     path = tmp_path / "other.mcap"
     with another(path, "std_msgs/msg/String", "/slave/measured_cp") as (add,):
@@ -355,15 +282,3 @@ def test_recovery_never_overwrites(tmp_path: Path) -> None:
         recover(path)
     out, _ = recover(path, tmp_path / "elsewhere")
     assert_holds_samples(Bag(out))
-
-
-def test_recovery_of_nothing_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(RecordingError, match="does not exist"):
-        recover(tmp_path / "nothing")
-    with pytest.raises(RecordingError, match=r"0 \.mcap files"):
-        recover(tmp_path)
-    with BagWriter(tmp_path / "bag", topics.ALL, JOINTS):
-        pass
-    with pytest.raises(RecordingError, match="no complete chunk"):
-        recover(tmp_path / "bag")
-    assert not (tmp_path / "bag_recovered").exists()

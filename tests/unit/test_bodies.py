@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 
 import teleop_core as tc
-from teleop_core.base.errors import ParameterError, ShapeError
 from teleop_core.kernels.geometry import rotations_from_quaternions
 from teleop_core.kinematics import FkStatus
 from teleop_core.robots import Robot
 from teleop_core.robots.bodies import Bodies, Joint, Solid, bodies_of
 from teleop_core.robots.bodies.describe import serial_bodies, unknown_bodies
-from teleop_core.robots.solids import along, capsule
+from teleop_core.robots.solids import along
 from teleop_machines.mma_models import frames, joints_of_model, loop_closure, model_table
 
 TABLE = {
@@ -228,16 +227,3 @@ def test_directions_turn_z_along_themselves_whichever_way_they_point() -> None:
     lengths = np.linalg.norm(ways, axis=1)
     assert np.abs(turned[:5] - ways[:5] / lengths[:5, None]).max() < 1e-9
     assert turned[5] == pytest.approx([0.0, 0.0, 1.0])
-
-
-def test_a_solid_refuses_sizes_that_it_cannot_have_and_bodies_joints_of_another_number() -> None:
-    with pytest.raises(ShapeError, match=r"\(6,\)"):
-        bodies_of(tc.load_robot("rcrt1")).poses(np.zeros(5))
-    pose = capsule(np.zeros(3), np.ones(3), 0.1, "link").pose
-    with pytest.raises(ShapeError):
-        Solid("box", (1.0, 2.0), pose, "link")
-    with pytest.raises(ParameterError) as caught:
-        Solid("sphere", (-1.0,), pose, "link")
-    assert caught.value.name == "size of a sphere"
-    with pytest.raises(ShapeError):
-        Solid("sphere", (1.0,), pose[:3], "link")

@@ -10,7 +10,6 @@ import yaml
 from scipy.spatial.transform import Rotation
 
 from present import present
-from teleop_core.base.errors import RecordingError
 from teleop_core.kernels.geometry import Array
 from teleop_core.kinematics import dh_kernels
 from teleop_core.robots import load_robot, robot_from_table
@@ -333,29 +332,6 @@ def test_axes_that_were_not_read_are_left_out(tmp_path: Path) -> None:
     assert measured.readings == 100
     found = calibrate(RCRT1, measured, "offsets").found
     assert found.errors.d[2] == pytest.approx(5.5e-3, abs=2e-5)
-
-
-def test_tables_that_lack_something_are_refused_with_what_it_is(tmp_path: Path) -> None:
-    table, _ = poses_table()
-    path = tmp_path / "poses.csv"
-    mistakes = {
-        r"joint theta4 \(or q4\)": table.drop(columns="theta4"),
-        "column for z": table.drop(columns="z"),
-        "row 3 of 'theta1' is 'oops'": table.astype({"theta1": object}),
-        "row 1 of 'd3' is 'nan'": table.assign(d3=np.nan),
-        "column 'x_s' is in 's'": table.rename(columns={"x": "x_s"}),
-        "far from its limits.*theta1_deg": table.assign(theta1=np.degrees(table["theta2"])),
-    }
-    mistakes["row 3 of 'theta1' is 'oops'"].loc[2, "theta1"] = "oops"
-    for pattern, wrong in mistakes.items():
-        wrong.to_csv(path, index=False)
-        with pytest.raises(CalibrationError, match=pattern):
-            read_measured(path, RCRT1)
-    path.write_text("")
-    with pytest.raises(RecordingError, match="no table"):
-        read_measured(path, RCRT1)
-    with pytest.raises(RecordingError, match="No such file"):
-        read_measured(tmp_path / "none.csv", RCRT1)
 
 
 def test_a_pose_that_was_misread_is_named(tmp_path: Path) -> None:

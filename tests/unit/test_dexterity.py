@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from teleop_core.base.errors import ParameterError
 from teleop_core.robots import dexterity, load_robot
 
 
@@ -60,13 +59,3 @@ def test_the_csv_holds_every_sample_with_all_digits(tmp_path: Path) -> None:
     assert header == ",".join(dexterity.COLUMNS)
     assert np.array_equal(np.array([row.split(",") for row in rows], float)[:, :3], points)
     assert np.array_equal(np.array([row.split(",") for row in rows], float)[:, 3], values)
-
-
-@pytest.mark.parametrize("length", [0.0, math.nan])
-def test_a_length_that_cannot_weigh_and_no_or_too_many_samples_are_refused(length: float) -> None:
-    for count in (0, 10**12):
-        with pytest.raises(ParameterError, match="count"):
-            dexterity.sample_workspace(load_robot("scara"), count, np.random.default_rng(0))
-    with pytest.raises(ParameterError) as caught:
-        dexterity.singular_values(load_robot("scara"), [0.0, 1.0, 0.1, 0.0], length)
-    assert caught.value.name == "length"

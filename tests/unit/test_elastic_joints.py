@@ -76,18 +76,6 @@ def test_a_gear_rings_at_the_frequency_of_two_masses_on_its_spring() -> None:
     assert abs(period / expected - 1.0) < 0.01
 
 
-@pytest.mark.parametrize(
-    ("gears", "told"),
-    [
-        ((0.0, 0.0, 0.0, 0.0, 10.0, 0.0), r"theta5.*all that it moves"),
-        ((1e7, 0.0, 0.0, 0.0, 0.0, 0.0), r"theta1.*1500"),
-    ],
-)
-def test_a_gear_that_moves_a_motor_alone_or_swings_too_fast_is_refused(gears: tuple[float, ...], told: str) -> None:
-    with pytest.raises(ParameterError, match=told):
-        slave(**{"plant.hardware.gear_stiffness": gears})
-
-
 @kernel
 def drive_on(p: simulation.SimulationRecord, s: simulation.SimulationState, arm: Any, efforts: Array) -> None:
     """What drives give for rows of efforts (N, 6); written in their place."""

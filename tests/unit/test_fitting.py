@@ -149,37 +149,6 @@ def changed(tmp_path: Path, change: Any) -> Path:
     return file
 
 
-@pytest.mark.parametrize(
-    ("change", "needed"),
-    [
-        (lambda t: t.drop(columns=["theta2", "target_d3"]), "lacks target_d3, theta2"),
-        (lambda t: t.replace({"theta1": {0.78529: np.nan}}), "line 2"),
-        (lambda t: t.assign(theta1="far"), "number"),
-        (lambda t: t[t["run"] == 1], "1 run"),
-        (lambda t: t.assign(target_d3=t["target_d3"] + 1e-3 * t["run"]), "several targets"),
-        (lambda t: t[:0], "no rows"),
-    ],
-)
-def test_a_table_of_another_shape_is_refused_in_one_line(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], change: Any, needed: str
-) -> None:
-    file = changed(tmp_path, change)
-    with pytest.raises(TeleopError, match=needed):
-        read_rests(file, ARM)
-    assert main(["fit", str(file), "--out", str(tmp_path / "out.yaml")]) == 2
-    shown = capsys.readouterr()
-    assert needed in shown.err
-    assert len(shown.err.strip().splitlines()) == 1
-    assert not (tmp_path / "out.yaml").exists()
-
-
-def test_a_missing_table_and_folder_are_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["fit", str(tmp_path / "none.csv")]) == 2
-    assert "none.csv" in capsys.readouterr().err
-    assert main(["fit", "--json", str(tmp_path / "no" / "fit.json")]) == 2
-    assert "make it first" in capsys.readouterr().err
-
-
 def test_command_writes_a_plant_that_a_session_takes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out, numbers = tmp_path / "plant.yaml", tmp_path / "fit.json"
     names = ["coulomb.theta1", "bias.theta1"]

@@ -12,7 +12,6 @@ import pytest
 import teleop_core as tc
 from present import present
 from random_arms import random_urdf
-from teleop_core.base.errors import ParameterError, UnknownNameError
 from teleop_core.kinematics import IkStatus
 from teleop_core.robots.arms.as_chain import chain_of
 from teleop_core.robots.bodies import bodies_of, urdf_of
@@ -246,38 +245,3 @@ def test_the_links_of_an_arm_with_followers_are_written_as_they_were_read(tmp_pa
 def test_an_arm_with_followers_is_no_plain_chain_for_errors_of_links(tmp_path: Path) -> None:
     assert chain_of(loaded(tmp_path)) is None
     assert "follow" not in tc.load_robot(str(tmp_path / "arm.urdf"), tip="a").joint_names
-
-
-MISTAKES = {
-    "nobody to follow": ('mimic joint="lead"', 'mimic joint="led"', {}, "mimic of joint follow"),
-    "itself": ('mimic joint="lead"', 'mimic joint="follow"', {}, "mimic of joint follow"),
-    "each other": (
-        '<dynamics damping="0.5" friction="0.2"/>',
-        '<mimic joint="follow"/>',
-        {},
-        "does not itself follow this joint",
-    ),
-    "factor of zero": ('multiplier="-2"', 'multiplier="0"', {}, "multiplier of mimic of joint"),
-    "a word": ('multiplier="-2"', 'multiplier="two"', {}, "multiplier of mimic of joint follow"),
-    "no room": ('offset="0.4"', 'offset="9"', {}, "limits of joint lead"),
-    "weight beside the way": (
-        '<limit lower="-0.5"',
-        '<mimic joint="lead"/><limit lower="-0.5"',
-        {"dynamics": "links"},
-        "joint side moves too, but is not on the path to the tip",
-    ),
-    "a leader beside the way": (
-        'mimic joint="lead"',
-        'mimic joint="side"',
-        {"dynamics": "links"},
-        "joint side moves too, but is not on the path to the tip",
-    ),
-}
-
-
-@pytest.mark.parametrize("name", MISTAKES)
-def test_a_mistake_is_told_by_its_joint(name: str, tmp_path: Path) -> None:
-    old, new, options, word = MISTAKES[name]
-    with pytest.raises((ParameterError, UnknownNameError), match=re.escape(word)) as told:
-        loaded(tmp_path, old, new, **options)
-    assert "\n" not in str(told.value)

@@ -10,12 +10,10 @@ import pytest
 import teleop_core as tc
 from led_tip import assert_none_gains_energy
 from teleop_console.world_nodes import object_outline
-from teleop_core.base.errors import ParameterError
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
 from teleop_core.shapes.basis.heights import THICKNESS, read_heights
 from teleop_core.shapes.height_field import HEIGHT_FIELD, HeightFieldParameters
-from teleop_core.shapes.mesh import MESH, MeshParameters
 
 SPACING = 2e-3
 X, Y = np.meshgrid(SPACING * (np.arange(31) - 15.0), SPACING * (np.arange(25) - 12.0), indexing="ij")
@@ -150,48 +148,3 @@ def test_the_page_draws_the_field_where_it_lies(folder: Path) -> None:
     offsets = drawn.reshape(-1, 3) - place
     np.testing.assert_allclose(np.ptp(offsets[:, :2], axis=0), (np.ptp(X), np.ptp(Y)), atol=1e-9)
     assert offsets[:, 2].max() == pytest.approx(FIELDS["ball"].max(), abs=1e-6)
-
-
-@pytest.mark.parametrize(
-    ("content", "said"),
-    [
-        (b"1,2,x", "ValueError"),
-        (b"", "no data"),
-        (b"0,0\n0,0", "4 x 4"),
-        (b"0,0,0,nan\n" * 4, "finite"),
-        (b"\xff\xfe", "Unicode"),
-    ],
-)
-def test_a_file_that_is_no_table_of_heights_is_refused(content: bytes, said: str, folder: Path) -> None:
-    path = folder / "bad.csv"
-    path.write_bytes(content)
-    with pytest.raises(ParameterError, match=said) as error:
-        HEIGHT_FIELD.numbers(HeightFieldParameters(file=str(path)))
-    assert error.value.name == "height_field.file"
-    assert "\n" not in str(error.value)
-
-
-@pytest.mark.parametrize(
-    ("more", "parameter"),
-    [
-        ({"spacing": 1e-5}, "step"),
-        ({"step": 5e-5}, "step"),
-        ({"spacing": 0.1}, "step"),
-        ({"spacing": 0.1, "step": 5e-3}, "spacing"),
-    ],
-)
-def test_a_field_that_does_not_fit_its_numbers_is_refused_by_their_name(
-    more: dict[str, float], parameter: str, folder: Path
-) -> None:
-    np.save(folder / "narrow.npy", np.zeros((25, 4)))
-    name = "narrow" if parameter == "spacing" else "flat"
-    with pytest.raises(ParameterError) as error:
-        HEIGHT_FIELD.numbers(field(folder, name, "npy", **more))
-    assert error.value.name == f"height_field.{parameter}"
-
-
-def test_a_file_that_is_not_there_is_refused() -> None:
-    for part, group in ((HEIGHT_FIELD, HeightFieldParameters()), (MESH, MeshParameters())):
-        with pytest.raises(ParameterError, match="a file with") as error:
-            part.numbers(group)
-        assert error.value.name == f"{part.name}.file"

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+import teleop_core as tc
 import teleop_exchange
 from teleop_core.kernels.geometry import Array
+from teleop_exchange import ImportOptions
 
 RATE = 100.0
 
@@ -25,6 +27,14 @@ def file_of(path: Path, quaternions: Array) -> Path:
     places = 0.01 * quaternions[:, :3]
     np.savetxt(path, np.column_stack((places, quaternions)), fmt="%.9f")
     return path
+
+
+def named(folder: Path, further: str = "") -> Path:
+    """A table of times and places, and of further columns of zeros, whose names stand in its head."""
+    rows = np.zeros((300, 4 + further.count(",")))
+    rows[:, :4] = np.column_stack((np.arange(300) / RATE, turns(0.3)[:, :3]))
+    np.savetxt(folder / "named.csv", rows, header=f"t,x,y,z{further}", comments="", delimiter=",")
+    return folder / "named.csv"
 
 
 @pytest.mark.parametrize("order", ["xyzw", "wxyz"])
@@ -72,8 +82,26 @@ def test_options_that_were_given_stand_in_the_report(tmp_path: Path) -> None:
     (given,) = [line for line in text.splitlines() if line.startswith("given")]
     for words in ("--rate 100.0", "--axes +y -x +z", "--scale 2.0", "--unit cm", "--center mean", "--gap 9.0"):
         assert words in given
-    plain = tmp_path / "named.csv"
-    np.savetxt(
-        plain, np.column_stack((np.arange(300) / RATE, turns(0.3)[:, :3])), header="t,x,y,z", comments="", delimiter=","
-    )
-    assert "given" not in str(teleop_exchange.import_recording(plain, tmp_path / "plain"))
+    assert "given" not in str(teleop_exchange.import_recording(named(tmp_path), tmp_path / "plain"))
+
+
+def test_an_existing_directory_is_never_touched(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / "precious").write_text("1")
+    with pytest.raises(tc.RecordingError, match="exists already"):
+        teleop_exchange.import_recording(named(tmp_path), out)
+    assert (out / "precious").read_text() == "1"
+
+
+def test_columns_that_are_left_unused_are_told(tmp_path: Path) -> None:
+    report = teleop_exchange.import_recording(named(tmp_path, ",PedalDown,grip"), tmp_path / "out")
+    assert "left unused: 'PedalDown', 'grip'" in report.told
+
+
+def test_options_say_what_they_are_on_the_command_line() -> None:
+    options = ImportOptions(position="2-4", unit="mm", euler=("xyz", "a", "b", "c"), rate=30.0)  # type: ignore[arg-type]
+    assert options.as_arguments() == [
+        "--rate", "30.0", "--position", "2", "3", "4", "--unit", "mm", "--euler", "xyz", "a", "b",
+        "c",
+    ]  # fmt: skip

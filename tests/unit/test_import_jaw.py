@@ -7,7 +7,7 @@ import pytest
 
 import teleop_core as tc
 import teleop_exchange
-from teleop_core.base.errors import ParameterError, RecordingError
+from teleop_core.base.errors import RecordingError
 from teleop_core.kernels.geometry import Array
 
 TIMES = np.arange(0.0, 4.0, 0.02)
@@ -50,10 +50,3 @@ def test_missing_values_repeat_and_a_column_without_numbers_is_refused(tmp_path:
     path = file_of(tmp_path / "none.csv", np.full(len(TIMES), np.nan))
     with pytest.raises(RecordingError, match="--jaw holds no numbers"):
         teleop_exchange.import_recording(path, tmp_path / "none", jaw=("grip", "1", "0"), unit="m")
-
-
-@pytest.mark.parametrize("words", [("grip", "1", "1"), ("grip", "open", "0"), ("grip", "nan", "0"), ("grip", "1")])
-def test_ends_that_are_no_two_different_numbers_are_refused(words: tuple[str, ...], tmp_path: Path) -> None:
-    path = file_of(tmp_path / "hand.csv", CLOSING)
-    with pytest.raises(ParameterError, match="--jaw"):
-        teleop_exchange.import_recording(path, tmp_path / "hand", jaw=words)

@@ -607,17 +607,3 @@ def test_over_a_network_the_jaw_closes_later_by_its_delay() -> None:
         .value("jaw.delay_s")
     )
     assert present(far) - present(here) == pytest.approx(0.1, abs=2e-3)
-
-
-JAWS = ("servo_jp", "setpoint_js", "measured_js", "grip", "object_cp", "board")
-
-
-def test_a_recorded_jaw_is_replayed_to_the_same_bits(tmp_path: Path) -> None:
-    settings: dict[str, Any] = {"jaw_sim.object.friction": 0.05, "operator.buttons.jaw": [5.3, 12.9]}  # it slides
-    first = tc.run("pick", duration=8.0, settings=settings).save(tmp_path / "bag")
-    again = tc.replay(tmp_path / "bag")
-    for name in ("hand/jaw", "slave/measured_js", *(f"slave/jaw/{name}" for name in JAWS)):
-        assert len(first[name]) > 10
-        np.testing.assert_array_equal(again[name].stamp_ns, first[name].stamp_ns)
-        np.testing.assert_array_equal(again[name].values, first[name].values)
-    assert first.score().value("jaw.slips") == 1

@@ -9,9 +9,6 @@ from typing import Any
 import pytest
 import yaml
 
-from teleop_core.base.errors import ParameterError, TeleopError
-from teleop_core.base.plain_yaml import LARGEST_TEXT
-from teleop_core.nodes.files import checked_arguments
 from teleop_core.nodes.launching import COMMON, ONE_ARM, TWO_ARMS, LaunchedProcess, processes
 from teleop_core.nodes.start import taken_names
 
@@ -80,12 +77,6 @@ def test_a_robot_is_that_of_all_stages_of_its_arm() -> None:
     assert sum(process.namespace == "/right" for process in both) == len(STAGES)
 
 
-@pytest.mark.parametrize(("name", "value"), [("log_level", "loud"), ("record", "perhaps"), ("processes", "")])
-def test_an_argument_of_no_meaning_is_refused(name: str, value: str) -> None:
-    with pytest.raises(ParameterError, match=name):
-        processes(given(**dict[str, Any]({name: value})))
-
-
 @pytest.mark.parametrize(("file", "own", "count"), [("teleop", ONE_ARM, 8), ("two_arms", TWO_ARMS, 14)])
 def test_a_launch_file_declares_its_arguments_and_starts_its_nodes(
     monkeypatch: pytest.MonkeyPatch, file: str, own: dict[str, tuple[str, str]], count: int
@@ -119,27 +110,6 @@ def test_a_launch_file_declares_its_arguments_and_starts_its_nodes(
     assert all(node["exec_name"] == node["name"] for node in started)
     stays = {node["name"] for node in started if not node["respawn"]}
     assert stays == {"slave", "slave_sim", "recorder"}
-
-
-BOMB = "\n".join(f"{own}: &{own} [{', '.join([inner] * 99)}]" for own, inner in (("a", "1"), ("b", "*a"), ("c", "*b")))
-
-
-@pytest.mark.parametrize(
-    ("text", "says"),
-    [
-        ("a: " + "x" * LARGEST_TEXT, "has more than"),
-        ("[", "is not YAML"),
-        (BOMB, "values"),
-        ("[" * 2000 + "]" * 2000, "nested too deeply"),
-        ("- " * 2000, "nested too deeply"),
-    ],
-    ids=("long", "open", "bomb", "nested lists", "nested entries"),
-)
-def test_a_parameter_file_of_a_node_costs_no_more_than_any_other(tmp_path: Path, text: str, says: str) -> None:
-    file = tmp_path / "mine.yaml"
-    file.write_text(text)
-    with pytest.raises(TeleopError, match=says):
-        checked_arguments(["--params-file", str(file)])
 
 
 def test_names_for_all_nodes_of_a_process_are_taken_out_and_others_are_kept() -> None:

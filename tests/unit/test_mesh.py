@@ -11,7 +11,6 @@ import coal
 import numpy as np
 import pytest
 import trimesh
-from numpy.typing import NDArray
 from trimesh import Trimesh
 
 import teleop_core as tc
@@ -172,34 +171,6 @@ def without(mesh: Trimesh, face: int) -> Trimesh:
     return mesh
 
 
-def flat() -> Trimesh:
-    return trimesh.creation.box((20.0, 20.0, 1e-6))
-
-
-def turned() -> Trimesh:
-    mesh = solid("box")
-    mesh.faces[0] = mesh.faces[0][::-1]
-    return mesh
-
-
-@pytest.mark.parametrize(
-    ("make", "name", "requirement"),
-    [
-        (lambda: without(solid("box"), 0), "mesh.file", "it has a hole at the edge"),
-        (turned, "mesh.file", "two triangles face opposite sides"),
-        (flat, "mesh.file", "encloses a volume"),
-    ],
-)
-def test_a_mesh_that_encloses_nothing_is_refused_in_one_line(
-    make: Callable[..., Any], name: str, requirement: str, tmp_path: Path
-) -> None:
-    make().export(tmp_path / "bad.obj")
-    with pytest.raises(ParameterError, match=requirement) as caught:
-        pressed(tmp_path / "bad.obj")
-    assert caught.value.name == name
-    assert "\n" not in str(caught.value)
-
-
 def pressed(file: Path, *settings: str) -> virtual.VirtualTime:
     """Session that presses a mesh."""
     texts = ["world=mesh", f"world.mesh.file={file}", *settings]
@@ -226,72 +197,6 @@ def test_a_mesh_that_is_inside_out_is_turned(folder: Path, tmp_path: Path) -> No
         place = tmp_path if name == "inverted" else folder
         distance, _ = found("mesh", parameters(place, name), np.array([(0.0, 0.0, 0.012)]))
         assert distance[0] == pytest.approx(-3e-3, abs=1e-5)
-
-
-@pytest.mark.parametrize(
-    ("text", "ending"), [("", "stl"), ("solid", "txt"), ("v 0 0 nothing\nf 1 1 1\n", "obj"), ("\x00" * 90, "zip")]
-)
-def test_what_is_no_mesh_is_refused_in_one_line(text: str, ending: str, tmp_path: Path) -> None:
-    file = tmp_path / f"none.{ending}"
-    file.write_text(text)
-    with pytest.raises(ParameterError, match=r"mesh\.file is .*must be a mesh"):
-        pressed(file)
-
-
-CORNERS = np.array([(0, 0, 0), (1, 1, 0), (1, 0, 1), (0, 1, 1)])
-FACES = np.array([(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)])
-
-
-def off(size: float, faces: NDArray[np.int64]) -> str:
-    rows = [*(size * CORNERS).tolist(), *([3, *face] for face in faces.tolist())]
-    return "\n".join((f"OFF\n4 {len(faces)} 0", *(" ".join(map(str, row)) for row in rows), ""))
-
-
-def obj(size: float, faces: NDArray[np.int64]) -> str:
-    rows = [("v", row) for row in (size * CORNERS).tolist()]
-    rows += [("f", row) for row in (faces + 1).tolist()]
-    return "\n".join(f"{kind} {' '.join(map(str, row))}" for kind, row in rows)
-
-
-@pytest.mark.parametrize(
-    ("size", "count", "said"),
-    [
-        (30.0, 0, "triangles|can be read"),
-        (1e120, 4, "longest side"),
-        (1e308, 4, "longest side"),
-        (-1e308, 4, "longest side"),
-        (1e-300, 4, "mesh"),
-    ],
-)
-@pytest.mark.parametrize(("write", "use"), [(off, "world"), (obj, "fixture")])
-def test_a_mesh_without_triangles_or_of_no_size_is_refused_in_one_line(
-    size: float, count: int, said: str, write: Callable[..., str], use: str, tmp_path: Path
-) -> None:
-    file = tmp_path / f"bad.{write.__name__}"
-    file.write_text(write(size, FACES[:count]))
-    texts = [f"{use}.kind=mesh", f"{use}.mesh.file={file}"]
-    with pytest.raises(ParameterError, match=said):
-        virtual.VirtualTime(configuration.configure("coarse_box", settings=texts))
-
-
-def test_a_mesh_that_does_not_fit_is_refused_with_what_would(folder: Path) -> None:
-    file = folder / "box.stl"
-    for settings, name, requirement in (
-        (["world.mesh.scale=1.0"], "mesh.scale", "now 60 m long"),
-        (["world.mesh.scale=0.000001"], "mesh.scale", "between 0.001 and 2 m long"),
-        (["world.mesh.step=0.00005"], "mesh.step", r"at least 0\.00039 m"),
-        (["world.mesh.step=0.02"], "mesh.step", r"at most 0\.0075 m"),
-    ):
-        with pytest.raises(ParameterError, match=requirement) as caught:
-            pressed(file, *settings)
-        assert caught.value.name == name
-    with pytest.raises(ParameterError, match="No such file") as caught:
-        pressed(folder / "none.stl")
-    assert caught.value.name == "mesh.file"
-    home = load_robot("rcrt1")
-    place = home.fk(home.home)[:3, 3] - (0.0, 0.0, 0.01)
-    with pytest.raises(ParameterError, match=r"which is 5\.0 mm inside"):
-        pressed(file, f"world.place={place.tolist()}")
 
 
 def test_a_grid_is_made_once_and_kept_by_what_the_file_says(
@@ -368,18 +273,6 @@ def gone(path: Path) -> None:
 
 def another(path: Path) -> None:
     trimesh.creation.box((50.0, 50.0, 31.0)).export(path)
-
-
-@pytest.mark.parametrize("becomes", [gone, another])
-def test_a_recording_replays_to_the_bit_whatever_became_of_its_mesh(
-    becomes: Callable[[Path], None], folder: Path, tmp_path: Path
-) -> None:
-    recording, path = recorded(folder, tmp_path)
-    before = recording["slave/true_cf"].values
-    assert np.abs(before).max() > 0.1
-    becomes(path)
-    again = tc.replay(present(recording.path))
-    np.testing.assert_array_equal(again["slave/true_cf"].values, before)
 
 
 def recorded(folder: Path, where: Path) -> tuple[tc.Recording, Path]:

@@ -13,11 +13,10 @@ from numpy.typing import NDArray
 
 import teleop_core as tc
 from teleop_core.bags.reader import Bag
-from teleop_core.base import NoParameters, ParameterError, PartError, TeleopError, build
+from teleop_core.base import NoParameters, PartError, TeleopError, build
 from teleop_core.coupling.network import LOST, NETWORKS, Network, register_network
 from teleop_core.coupling.network.network import NETWORK, NetworkLink
 from teleop_core.coupling.network.presets import PRESETS, NetworkParameters
-from teleop_core.coupling.network.trace import read_trace
 from teleop_core.evaluation.metrics.network import _Ages
 from teleop_core.kernels import Array, kernel
 from teleop_core.session import configuration, virtual
@@ -273,31 +272,6 @@ def test_a_trace_is_played_row_by_row_and_begins_anew_at_its_end(tmp_path: Path)
     _, stamps = through(network, walk(700))
     age = np.arange(2, 702) - stamps / MS
     assert age[60:95] == pytest.approx(50.0)
-
-
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("0,0.1\n2,0.1\n1,0.1\n", "line 3 has 1 s, the row before 2 s"),
-        ("-1,0.1\n2,0.1\n", "line 1 has -1 s"),
-        ("0,-0.2\n1,0.1\n", "line 1 has -0.2 s"),
-        ("time,delay\n0,0.1\n1,fast\n", "in line 3"),
-        ("0,nan\n1,0\n", "in line 1"),
-        ("0,0.1\n1,35.2\n", "line 2 has 35.2 s: are the delays in ms"),
-        ("0,0.1\n1,1e9\n", "line 2 has 1e.09 s"),
-        ("1744909208000,0.1\n1744909208100,0.1\n", "line 1 has 1744909208000 s: are they in ms"),
-        ("0,0.1\n100,0.1\n200,0.1\n", "not every 100 s: are its times in ms"),
-        ("0,0.1\n", "two rows"),
-        ("", "two rows"),
-    ],
-)
-def test_a_trace_that_cannot_be_is_refused_by_its_line(tmp_path: Path, text: str, said: str) -> None:
-    file = tmp_path / "pings.csv"
-    file.write_text(text)
-    with pytest.raises(ParameterError, match=said):
-        read_trace(str(file))
-    with pytest.raises(ParameterError, match="can be read"):
-        read_trace(str(tmp_path / "none.csv"))
 
 
 def test_with_increments_a_lost_packet_is_lost_motion() -> None:

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from held_master import HeldMaster
-from teleop_core.base import NoParameters, PartError, Within, build, parameter
+from teleop_core.base import NoParameters, Within, build, parameter
 from teleop_core.hand.operators import OPERATORS, Operator, Setting, following, register_operator
 from teleop_core.hand.operators.behaviour import OperatorParameters
 from teleop_core.hand.operators.shapes import PHASES, minimum_jerk
@@ -238,42 +237,3 @@ def test_own_operator_is_made_with_its_parameters_the_seed_and_its_phases(own_pa
     register_operator("mine", Operator("mine", make, Wanted))
     master_of("mine", **{"mine.height": 0.02})
     assert made == [(0.02, 1, PHASES)]
-
-
-def stepped(operator: Any) -> None:
-    register_operator("mine", operator)
-    master_of("mine").step()
-
-
-def put_together(**parts: Any) -> None:
-    stepped(Operator("mine", **{"make": lambda parameters, setting: motion_of("hold", 1), **parts}))
-
-
-WRONG: dict[str, tuple[Callable[[], object], str]] = {
-    "no samples": (partial(following, "mine", np.zeros(0), np.zeros((0, 3))), "not (0,), (0, 3)"),
-    "rows of another number": (partial(following, "mine", np.arange(3), np.zeros((2, 3))), "not (3,), (2, 3)"),
-    "a single row": (partial(following, "mine", np.arange(3), np.zeros(3)), "not (3,), (3,)"),
-    "four columns": (partial(following, "mine", np.arange(3), np.zeros((3, 4))), "it has 4"),
-    "a number that is none": (partial(following, "mine", np.arange(2), np.array([[0, 0, 0], [0, np.nan, 0]])), "row 1"),
-    "a time that is none": (partial(following, "mine", np.array([0.0, np.nan]), np.zeros((2, 3))), "row 1"),
-    "times that stand still": (partial(following, "mine", np.array([0.0, 1.0, 1.0]), np.zeros((3, 3))), "row 2"),
-    "takes no times": (partial(stepped, lambda: np.zeros((1, 3))), "TypeError"),
-    "has four columns": (partial(stepped, lambda times: np.zeros((len(times), 4))), "not (1000, 4)"),
-    "answers one row": (partial(stepped, lambda times: np.zeros(3)), "not (3,)"),
-    "answers no number": (partial(stepped, lambda times: np.full((len(times), 3), np.nan)), "at 0.001 s"),
-    "answers words": (partial(stepped, lambda times: "up"), "numbers"),
-    "raises": (partial(stepped, lambda times: {}["up"]), "KeyError"),  # type: ignore[index]
-    "is made by a number": (partial(put_together, make=5), "callable make"),
-    "is made of too little": (partial(put_together, make=lambda parameters: None), "make(parameters, setting)"),
-    "is asked for no tick": (partial(put_together, ahead=0), ">= 1 tick"),
-    "has parameters of no dataclass": (partial(put_together, parameters=dict), "dataclass"),
-}
-
-
-@pytest.mark.parametrize("case", WRONG)
-def test_operator_who_is_wrong_is_refused_before_the_first_tick(own_parts: None, case: str) -> None:
-    make, expected = WRONG[case]
-    with pytest.raises(PartError) as error:
-        make()
-    assert (error.value.kind, error.value.name) == ("operator", "mine")
-    assert expected in error.value.expected

@@ -4,24 +4,19 @@ import os
 import subprocess
 import sys
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
-import numpy as np
 import pytest
 
 from teleop_core.base import NoParameters, ParameterError, PartError, Within, build, parameter, specs
 from teleop_core.graph import Stage, register_stage
-from teleop_core.graph.topics import SLAVE_MEASURED_CP, SLAVE_SERVO_CP, TASK_STATE, Kind, Topic, passed_on
-from teleop_core.hand.operators import Operator, register_operator
-from teleop_core.hand.tasks import Task, register_task
+from teleop_core.graph.topics import SLAVE_MEASURED_CP, Kind, Topic, passed_on
 from teleop_core.kernels import IS_COMPILED, kernel, records
 from teleop_core.session.configuration import configure
 from teleop_core.shapes import register_shape, sphere
-from teleop_core.slave.controllers import register_controller
-from teleop_core.slave.controllers.pid import PID
 
 ECHO = Topic("test/echo", Kind.POSE, passed_on("slave/measured_cp"))
 
@@ -79,31 +74,7 @@ def test_wrong_declaration_of_a_parameter_is_refused_before_it_is_used(group: ty
             way()
 
 
-WAYS_IN = {
-    "shape": lambda group: register_shape(replace(sphere.SPHERE, name="own", parameters=group)),
-    "controller": lambda group: register_controller(replace(PID, name="own", parameters=group)),
-    "operator": lambda group: register_operator("own", Operator("own", lambda p, s: None, group)),  # type: ignore[arg-type, return-value]
-    "stage": lambda group: stage("own", group),
-}
-
-
-@pytest.mark.parametrize("kind", WAYS_IN)
-@pytest.mark.parametrize("group", [NoParameters(), TooFast(), dict], ids=repr)
-def test_group_that_is_no_dataclass_but_an_object_is_refused(
-    own_parts: None, kind: str, group: NoParameters | TooFast | type[object]
-) -> None:
-    with pytest.raises(PartError, match=f"^{kind} 'own' must be one whose parameters are a dataclas"):
-        WAYS_IN[kind](group)
-
-
 # Names.
-
-
-@pytest.mark.parametrize("name", ["", "my fixture", "a.b", "a/b", "-a", "a=b", None, 5])
-def test_name_that_keys_and_files_cannot_hold_is_refused(own_parts: None, name: str | int | None) -> None:
-    with pytest.raises(PartError, match="named with letters, digits, _ and -") as error:
-        register_shape(replace(sphere.SPHERE, name=cast(str, name)))
-    assert (error.value.kind, error.value.name) == ("shape", name)
 
 
 @pytest.mark.parametrize("name", ["my_2nd", "my-cone", "Kegel", "größe"])
@@ -111,23 +82,7 @@ def test_name_of_letters_digits_underscores_and_hyphens_is_taken(own_parts: None
     assert register_shape(replace(sphere.SPHERE, name=name)).name == name
 
 
-@pytest.mark.parametrize("name", ["", "my-limit", "my limit", "2nd", "a.b"])
-def test_name_of_a_stage_that_is_no_identifier_is_refused(name: str) -> None:
-    with pytest.raises(PartError, match="a name of letters, digits and _"):
-        stage(name)
-
-
 # Topics of a stage.
-
-
-@pytest.mark.parametrize("word", ["reads", "writes", "late", "needs"])
-@pytest.mark.parametrize("value", [SLAVE_SERVO_CP, "slave/servo_cp", ("slave/servo_cp",), [SLAVE_SERVO_CP], None])
-def test_topics_of_a_stage_that_are_no_tuple_of_topics_are_refused_with_an_example(
-    word: str, value: str | Sequence[str | Topic] | Topic | None
-) -> None:
-    given: dict[str, Any] = {"reads": (SLAVE_MEASURED_CP,), "writes": (ECHO,), word: value}
-    with pytest.raises(PartError, match=rf"whose {word} is a tuple of Topic, such as \(topics\."):
-        Stage("echo", NoParameters, step=rest, **given)
 
 
 # Fields of a record.
@@ -145,19 +100,6 @@ def test_misspelt_field_of_a_plain_record_suggests_the_near_one() -> None:
 
 
 # Indices.
-
-
-@kernel
-def beyond_the_end(p: Any, s: Any, row: Any, dt: Any) -> None:
-    for i in range(8):
-        row.test_echo[i] = row.slave_measured_cp[i]
-
-
-def test_index_beyond_the_end_is_told_with_file_and_line_before_the_first_tick() -> None:
-    line = beyond_the_end.py_func.__code__.co_firstlineno + 3
-    told = rf"^stage 'echo' must be one that stays inside its arrays; index 7 is .*\.py:{line}\)$"
-    with pytest.raises(PartError, match=told):
-        stage(step=beyond_the_end).run(NoParameters())
 
 
 @kernel
@@ -227,34 +169,3 @@ def test_parameter_of_a_stage_that_the_session_has_not_is_refused_with_the_way_o
 
 
 # Tasks.
-
-
-def test_a_task_that_counts_no_attempt_at_its_goals_is_refused() -> None:
-    def endless(numbers: Any, memory: Any, scene: Any, state: Any) -> None:
-        state[0], state[TASK_STATE.columns.index("width")] = 1.0, 0.01
-
-    with pytest.raises(PartError, match="in ten minutes at its goals it counts no attempt"):
-        register_task(Task("endless", NoParameters, endless))
-
-
-def test_a_task_that_counts_no_success_at_its_goals_is_refused() -> None:
-    at = {name: i for i, name in enumerate(TASK_STATE.columns)}
-
-    def always_late(numbers: Any, memory: Any, scene: Any, state: Any) -> None:
-        state[0] += 1.0
-        state[at["width"]], state[at["attempts"]], state[at["errors"]] = 0.01, state[0], state[0]
-
-    with pytest.raises(PartError, match=r"in ten minutes at its goals it counts \d+ attempts without one"):
-        register_task(Task("always_late", NoParameters, always_late))
-
-
-def test_a_compiled_task_that_reads_beyond_its_parameters_is_refused() -> None:
-    at = {name: i for i, name in enumerate(TASK_STATE.columns)}
-    attempts, width, time = at["attempts"], at["width"], at["time"]
-
-    @kernel
-    def beyond(numbers, memory, scene, state):  # type: ignore[no-untyped-def]
-        state[0], state[attempts], state[width], state[time] = 1.0, 1.0, 0.01, numbers[7]
-
-    with pytest.raises(PartError, match="one that writes 22 finite numbers"):
-        register_task(Task("beyond", NoParameters, beyond, numbers=lambda _: np.zeros(8)[:0]))  # sound numbers follow

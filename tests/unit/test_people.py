@@ -13,7 +13,7 @@ import pytest
 
 from teleop_console.drivers import Drivers
 from teleop_console.link import ArmView, View
-from teleop_core.base.errors import SessionError, TeleopError
+from teleop_core.base.errors import SessionError
 from teleop_core.graph.topics import TASK_STATE
 from teleop_lab.people.compare import comparison_page, comparison_table, people_dataset
 from teleop_lab.people.conduct import score_all
@@ -86,34 +86,6 @@ def test_practice_comes_before_the_trials_that_count_and_the_recording_names_wha
     assert made.groups["operator"].kind.kind == "remote"
     assert "participant p02, trial 2, repetition 1" in made.groups["teleop"].description
     assert made.groups["display"].latency == trials[1].values["display.latency"]
-
-
-@pytest.mark.parametrize(
-    ("line", "said"),
-    [
-        ("participants: 0", "people.participants is 0"),
-        ("practice: yes", "people.practice is True"),
-        ("order: random", "one of: fixed, shuffled, latin"),
-        ("ask: often", "one of: trial, condition, end"),
-        ("titel: x", "parameter of people is 'titel'"),
-        ("title: ''", "people.title is ''"),
-        ("duration: .nan", "people.duration"),
-        ("repetitions: 150", "people.repetitions"),
-        ("operator: nobody", "nobody"),
-        ("questions: [tlx, {name: effort, text: a, low: b, high: c}]", "name of a question is 'effort'"),
-        ("questions: [{name: fun}]", "people.questions"),
-        ("questions: &a [*a]", "alias"),
-    ],
-)
-def test_a_mistake_in_the_file_is_one_line_before_anything_starts(line: str, said: str, tmp_path: Path) -> None:
-    key = line.partition(":")[0]
-    before, _, people = FILE.read_text().partition("people:\n")
-    kept = [old for old in people.splitlines() if not old.strip().startswith(f"{key}:")]
-    (tmp_path / "s.yaml").write_text("\n".join([before + "people:", f"  {line}", *kept]))
-    with pytest.raises(TeleopError) as raised:
-        read_plan(tmp_path / "s.yaml")
-    assert said in str(raised.value)
-    assert "\n" not in str(raised.value)
 
 
 # -- going on ----------------------------------------------------------------------------------

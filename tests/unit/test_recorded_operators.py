@@ -208,12 +208,6 @@ def test_other_tables_are_guessed_with_a_note(tmp_path: Path) -> None:
     assert np.allclose(got[:, :3], PLACES - PLACES[0], rtol=0, atol=1e-12)
 
 
-def test_a_missing_recording_is_told_before_anything_runs(tmp_path: Path) -> None:
-    for name in ("nothing.csv", "nothing"):
-        with pytest.raises(tc.RecordingError, match="No such file"):
-            tc.configuration(settings={"operator.kind": "bag", "operator.bag": name})
-
-
 def test_hand_follows_a_recording_of_others_to_its_end(tmp_path: Path) -> None:
     path = bag(tmp_path / "bag")
     options: dict[str, Any] = {"operator.center": (0.0, 0.0, 0.03), "operator.approach_time": 1.0}

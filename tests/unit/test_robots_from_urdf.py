@@ -5,7 +5,6 @@ import re
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pinocchio
@@ -14,7 +13,7 @@ from pinocchio import Data, Model
 
 from present import present
 from random_arms import random_urdf
-from teleop_core.base.errors import ParameterError, RecordingError, ShapeError, TeleopWarning, UnknownNameError
+from teleop_core.base.errors import ParameterError, ShapeError, TeleopWarning
 from teleop_core.kernels.geometry import Array
 from teleop_core.kinematics import DIRECTIONS, IkStatus
 from teleop_core.robots import freedom, load_robot, load_robot_set
@@ -251,77 +250,14 @@ def test_an_inertia_of_no_body_is_no_matter_where_nothing_moves_it_or_axes_are_i
     assert present(load_robot(str(path), **TOOL).drives).inertia[0] > present(plain.drives).inertia[0]
 
 
-CIRCLE = (f'type="fixed"><parent link="{link}"/><child link="tool0"/>' for link in ("flange", "tool0"))
 LOW, ELBOW = 'lower="-2.6"', '"elbow" type="revolute"'
 TOOL = {"tip": "tool0"}
 
 
-def changed(old: str, new: str, **options: str) -> tuple[str, dict[str, str]]:
-    """The example with a mistake, and with what options it is loaded."""
+def changed(old: str, new: str) -> str:
+    """The example with one change."""
     assert old in TEXT
-    return TEXT.replace(old, new, 1), options or TOOL
-
-
-MISTAKES: dict[str, tuple[tuple[str, dict[str, Any]], str]] = {
-    "no tip": ((TEXT, {}), "tip is '', must be one of camera, tool0"),
-    "unknown tip": ((TEXT, {"tip": "tool1"}), "tool1"),
-    "tip before every joint": ((TEXT, {"tip": "base"}), "a joint must lie between"),
-    "unknown option": ((TEXT, {"tip": "tool0", "L1": 1.0}), "L1"),
-    "unknown dynamics": ((TEXT, {"tip": "tool0", "dynamics": "full"}), "independent, links"),
-    "too weak": (changed('effort="80"', 'effort="0.05"', dynamics="links", **TOOL), "of joint elbow"),
-    "unknown direction": ((TEXT, {"tip": "tool0", "task": "x up"}), "up"),
-    "no robot": (("<model/>", TOOL), "<robot>"),
-    "no links": (("<robot/>", TOOL), "<link>"),
-    "no joints": (('<robot><link name="a"/></robot>', TOOL), "<joint>"),
-    "two links of a name": (changed('name="camera"', 'name="forearm"'), "link name"),
-    "two roots": (changed("<joint", '<link name="lost"/><joint'), "lost"),
-    "two parents": (changed('child link="camera"', 'child link="tool0"'), "link tool0"),
-    "a circle beside the root": (changed(*CIRCLE), "joint tool_mount"),
-    "a circle of all links": (
-        (
-            '<robot name="r"><link name="a"/><link name="b"/>'
-            '<joint name="ab" type="fixed"><parent link="a"/><child link="b"/></joint>'
-            '<joint name="ba" type="fixed"><parent link="b"/><child link="a"/></joint></robot>',
-            {},
-        ),
-        "joint ",
-    ),
-    "a link that carries itself": (changed('<parent link="upper_arm"/>', '<parent link="forearm"/>'), "joint elbow"),
-    "no parent": (changed('<parent link="upper_arm"/>', ""), "parent of joint elbow"),
-    "planar": (changed(ELBOW, '"elbow" type="planar"'), "type of joint elbow"),
-    "no type": (changed(ELBOW, '"elbow"'), "type of joint elbow"),
-    "an endless axis": (changed("0 1 0", "0 inf 0"), "xyz of axis of joint shoulder"),
-    "a tiny axis": (changed("0 1 0", "0 1e-12 0"), "axis of joint shoulder"),
-    "negative velocity": (changed('velocity="3.1"', 'velocity="-3.1"'), "velocity of joint elbow"),
-    "an inertia that is no number": (changed('izz="0.008"', 'izz="nan"'), "izz of link forearm"),
-    "a mass that is no number": (changed('mass value="3.0"', 'mass value="x"'), "link forearm"),
-    "unknown parent": (changed('parent link="forearm"', 'parent link="fore"'), "of joint roll"),
-    "floating": (changed(ELBOW, '"elbow" type="floating"'), "joint elbow"),
-    "no length of axis": (changed("0 1 0", "0 0 0"), "axis of joint shoulder"),
-    "limits without room": (changed(LOW, 'lower="2.6"'), "joint elbow"),
-    "no limits": (changed(f'<limit {LOW} upper="2.6"', "<limit"), "<limit> of joint elbow is 'missing'"),
-    "no limit": (
-        changed(f'<limit {LOW} upper="2.6" effort="80" velocity="3.1"/>', ""),
-        "<limit> of joint elbow is 'missing'",
-    ),
-    "a word for a number": (changed(LOW, 'lower="low"'), "lower of joint elbow"),
-    "not a number": (changed('upper="2.6"', 'upper="nan"'), "upper of joint elbow"),
-    "two numbers of three": (changed('xyz="0 0 0.42"', 'xyz="0 0.42"'), "joint elbow"),
-    "negative effort": (changed('effort="80"', 'effort="-80"'), "effort of joint elbow"),
-    "an origin out of reach": (changed('xyz="0 0 0.42"', 'xyz="-1001 0 0"'), "within 1000 m"),
-    "negative mass": (changed('mass value="3.0"', 'mass value="-3.0"'), "link forearm"),
-    "an inertia of no body": (changed('izz="0.008"', 'izz="0.9"', dynamics="links", **TOOL), "of link forearm"),
-}
-
-
-@pytest.mark.parametrize("name", MISTAKES)
-def test_a_mistake_is_told_by_its_element(name: str, tmp_path: Path) -> None:
-    (text, options), word = MISTAKES[name]
-    path: Any = tmp_path / "arm.urdf"
-    path.write_text(text)
-    with pytest.raises((ParameterError, UnknownNameError), match=re.escape(word)) as told:
-        load_robot(str(path), **options)
-    assert "\n" not in str(told.value)
+    return TEXT.replace(old, new, 1)
 
 
 WORDS = ("nan", "-inf", "x", "0.2m", "1e300", "-1e160", "2e9", "0 0", "nan 0.1", "0.2m 0.1")
@@ -365,26 +301,26 @@ def told(text: str, tmp_path: Path) -> tuple[Robot, str]:
 
 def test_soft_limits_of_a_controller_are_kept_and_told(tmp_path: Path) -> None:
     soft = '<safety_controller soft_lower_limit="-1.0" soft_upper_limit="9" k_velocity="1"/>'
-    robot, notes = told(changed(f"<limit {LOW}", f"{soft}<limit {LOW}")[0], tmp_path)
+    robot, notes = told(changed(f"<limit {LOW}", f"{soft}<limit {LOW}"), tmp_path)
     elbow = robot.joint_names.index("elbow")
     assert (robot.lower[elbow], robot.upper[elbow]) == (-1.0, 2.6)
     assert notes == "elbow: narrowed to the soft limits of its safety_controller"
     assert told(TEXT, tmp_path)[1] == ""
     none = '<safety_controller k_velocity="1"/>'
-    robot, notes = told(changed(f"<limit {LOW}", f"{none}<limit {LOW}")[0], tmp_path)
+    robot, notes = told(changed(f"<limit {LOW}", f"{none}<limit {LOW}"), tmp_path)
     assert (robot.upper[elbow], notes) == (2.6, "")
 
 
 def test_limits_that_mean_none_are_told_and_assumed_as_of_continuous_joints_whose_own_are_told(tmp_path: Path) -> None:
-    text = changed(ELBOW, '"elbow" type="continuous"')[0]
+    text = changed(ELBOW, '"elbow" type="continuous"')
     assert told(text, tmp_path)[1] == "elbow: lower and upper are ignored: the joint is continuous"
     ends = f'<limit {LOW} upper="2.6"'
-    text = changed(ends, f'<limit {LOW} upper="999999"')[0]
+    text = changed(ends, f'<limit {LOW} upper="999999"')
     robot, notes = told(text, tmp_path)
     elbow = robot.joint_names.index("elbow")
     assert robot.upper[elbow] == 2.0 * math.pi > -robot.lower[elbow] == 2.6
     assert notes == "elbow: limits beyond 1000 rad count as no limits; 6.28 rad are assumed"
-    robot, _ = told(changed(ends, '<limit lower="-999999" upper="999999"')[0], tmp_path)
+    robot, _ = told(changed(ends, '<limit lower="-999999" upper="999999"'), tmp_path)
     assert -robot.lower[elbow] == 2.0 * math.pi
 
 
@@ -398,14 +334,14 @@ def test_limits_that_mean_none_are_told_and_assumed_as_of_continuous_joints_whos
     ],
 )
 def test_numbers_that_look_like_another_unit_are_told(old: str, new: str, said: str, tmp_path: Path) -> None:
-    assert told(changed(old, new)[0], tmp_path)[1] == said
+    assert told(changed(old, new), tmp_path)[1] == said
 
 
 @pytest.mark.filterwarnings("error")
 def test_an_arm_that_may_not_be_meant_so_is_loaded_with_a_warning(tmp_path: Path) -> None:
     """As a session tells it; the silent way is for those who tell it themselves."""
     path = tmp_path / "arm.urdf"
-    path.write_text(changed(LOW, 'lower="-170"')[0])
+    path.write_text(changed(LOW, 'lower="-170"'))
     with pytest.warns(TeleopWarning, match=r"arm.urdf: limits of elbow 170 rad: .*degrees") as of:
         load_robot(str(path), **TOOL)
     assert [one.filename for one in of] == [__file__]
@@ -417,14 +353,14 @@ def test_an_arm_that_may_not_be_meant_so_is_loaded_with_a_warning(tmp_path: Path
 
 def test_a_session_tells_the_notes_of_its_arm(tmp_path: Path) -> None:
     path = tmp_path / "ARM.URDF"
-    path.write_text(changed(LOW, 'lower="-170"')[0])
+    path.write_text(changed(LOW, 'lower="-170"'))
     notes = notes_of(configuration("coarse_box", robot=str(path), geometry=["tip=tool0"]))
     assert f"{path}: limits of elbow 170 rad: are they degrees?" in notes
 
 
 def test_frames_that_weigh_next_to_nothing_have_no_inertia(tmp_path: Path) -> None:
     body = '<inertial><mass value="1e-8"/><inertia ixx="1e-8" iyy="0" izz="0"/></inertial>'
-    text = changed('<link name="tool0"/>', f'<link name="tool0">{body}</link>')[0]
+    text = changed('<link name="tool0"/>', f'<link name="tool0">{body}</link>')
     for dynamics in ("links", "independent"):
         path = tmp_path / "arm.urdf"
         path.write_text(text)
@@ -441,25 +377,6 @@ def test_a_heavy_arm_of_weak_drives_is_not_held_by_a_friction_that_was_assumed(t
     most = 0.5 * drives.effort_limit / drives.speed_limit
     assert (drives.viscous <= most * (1 + 1e-12)).all()
     run("coarse_box", duration=0.05, robot=str(path), geometry=["tip=tool0"])
-
-
-@pytest.mark.parametrize("encoding", ["utf-8", "utf-16"])
-def test_entities_are_refused_before_they_grow(encoding: str, tmp_path: Path) -> None:
-    names = [f'<!ENTITY e{i} "{f"&e{i - 1};" * 10}">' for i in range(1, 12)]
-    bomb = f'<!DOCTYPE robot [<!ENTITY e0 "ten letters">{"".join(names)}]><robot name="&e11;"/>'
-    path = tmp_path / "bomb.urdf"
-    path.write_bytes(bomb.encode(encoding))
-    with pytest.raises(ParameterError, match="DOCTYPE"):
-        load_robot(str(path))
-
-
-def test_a_file_that_is_no_xml_or_not_there_is_one_line(tmp_path: Path) -> None:
-    path = tmp_path / "arm.urdf"
-    with pytest.raises(RecordingError, match=r"arm\.urdf"):
-        load_robot(str(path))
-    path.write_text(TEXT[:500])
-    with pytest.raises(RecordingError, match=r"arm\.urdf"):
-        load_robot(str(path))
 
 
 # -- arms that cannot hold every pose --------------------------------------------------------------

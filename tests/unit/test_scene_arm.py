@@ -8,10 +8,10 @@ import pytest
 
 import teleop_core as tc
 from present import present
-from teleop_core.base import ParameterError, RecordingError, TeleopError
+from teleop_core.base import ParameterError, TeleopError
 from teleop_core.robots.dynamics.chain_dynamics import inertia_matrix
 from teleop_scene import models, truth
-from teleop_scene.arm import SceneRobot, arm_of, load_scene
+from teleop_scene.arm import SceneRobot, arm_of
 
 ODD = """<mujoco><compiler angle="radian"/><option gravity="1 2 -9"/><worldbody>
   <body name="stand" pos="0.3 -0.2 0.1" euler="0.3 -0.2 0.7">
@@ -119,18 +119,6 @@ def test_a_missing_or_unmoved_tip_is_refused_by_name(tip: str, words: str) -> No
     model = mujoco.MjModel.from_xml_string(ODD.format(more=""))
     with pytest.raises(ParameterError, match=words):
         arm_of(Path("odd.xml"), model, tip)
-
-
-def test_files_that_are_no_model_are_refused_in_one_line(tmp_path: Path) -> None:
-    path = tmp_path / "scene.xml"
-    with pytest.raises(RecordingError, match="cannot be read"):
-        load_scene(path)
-    for text in ("<mujoco><worldbody>", '<mujoco><asset><mesh name="m" file="gone.stl"/></asset></mujoco>'):
-        path.write_text(text)
-        with pytest.raises(ParameterError) as told:
-            load_scene(path)
-        assert "\n" not in str(told.value)
-    assert "gone.stl" in str(told.value)
 
 
 def test_a_scene_without_its_package_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -190,7 +190,7 @@ def test_a_report_of_a_union_has_its_shape_again() -> None:
 
 
 @pytest.mark.parametrize("kind", ["mesh", "union"])
-def test_meshes_hold_a_hand_and_are_replayed_and_scored_though_they_are_gone(kind: str, tmp_path: Path) -> None:
+def test_meshes_hold_a_hand_and_are_scored_though_they_are_gone(kind: str, tmp_path: Path) -> None:
     trimesh.creation.box((30.0, 30.0, 30.0)).export(tmp_path / "box.stl")
     trimesh.creation.icosphere(subdivisions=4, radius=8.0).export(tmp_path / "ball.stl")
     parts = [f"mesh file='{tmp_path / 'box.stl'}'", f"mesh file='{tmp_path / 'ball.stl'}' at=[0.0, 0.015, 0.0]"]
@@ -204,8 +204,6 @@ def test_meshes_hold_a_hand_and_are_replayed_and_scored_though_they_are_gone(kin
     after = evaluate(Bag(tmp_path / "bag"))
     assert after.fixture == before.fixture
     assert after.fixture.unscored is None
-    again = tc.replay(tmp_path / "bag")
-    assert np.array_equal(again["master/servo_cf"].values, held["master/servo_cf"].values)
 
 
 @pytest.mark.parametrize(

@@ -474,18 +474,6 @@ def test_gains_that_change_before_the_first_tick_count_from_the_begin(law: str) 
     assert changed.signals["slave_measured_js"].tolist() == made.signals["slave_measured_js"].tolist()
 
 
-LISTS = ("viscous", "coulomb", *(f"controller.pid.{name}" for name in ("kp", "ki", "kd")))
-LISTS += tuple(f"controller.{law}.{'kp' if law == 'source_pid' else 'bandwidth'}" for law in CONTROLLERS.names())
-
-
-@pytest.mark.parametrize("name", LISTS)
-def test_list_of_another_length_than_the_joints_is_refused(name: str) -> None:
-    law = {"controller.kind": name.split(".")[1]} if "controller" in name else {}
-    with pytest.raises(ParameterError) as error:
-        pair.SimulatedArm(build(pair.ArmParameters, {**law, name: (1.0,) * 5}))
-    assert error.value.name == f"slave_sim.{name}"
-
-
 def test_refused_retuning_changes_nothing() -> None:
     bench: Any = Bench()
     before, gains = bench.slave.simulated.parameters.copy(), bench.slave.simulated.arm.gains.copy()

@@ -122,16 +122,6 @@ def test_a_session_that_fails_is_a_point_with_its_error(own_parts: None, tmp_pat
     assert np.isnan(data["position_error_mm.rms"].values.ravel()[0])
 
 
-@pytest.mark.parametrize("count", [10**9, 10**50, 10**350], ids=["1e9", "1e50", "1e350"])
-def test_a_file_with_more_seeds_than_a_study_may_have_is_refused_before_they_are_listed(
-    count: int, tmp_path: Path
-) -> None:
-    file = tmp_path / "many.yaml"
-    file.write_text(f"scenario: point\nseeds: {count}\nmetrics: [task.time_s]\n")
-    with pytest.raises(tc.ParameterError, match="a number of seeds, at most 1000000"):
-        read_study(file)
-
-
 def test_a_store_of_another_study_is_refused(found: Found, tmp_path: Path) -> None:
     store, _ = found
     with pytest.raises(tc.TeleopError, match="another study"):

@@ -182,16 +182,6 @@ def test_a_rod_that_tumbles_onto_a_plane_never_has_more_energy_than_at_first(see
         assert energy[-1] > 0.95 * energy[0]
 
 
-def test_several_points_or_a_radius_are_refused_for_needles_and_buttons() -> None:
-    for text in ("world.tool_points=2", "world.tool_radius=0.001"):
-        for more in ("world=button", "world.puncture_force=1.0"):
-            with pytest.raises(ParameterError, match=r"that of a needle"):
-                configure("free_motion", settings=["world=box", more, text])
-    for text in ("world.tool_points=17", "world.tool_points=0", "world.tool_length=0.0"):
-        with pytest.raises(ParameterError, match="tool_"):
-            configure("free_motion", settings=[text])
-
-
 def test_a_tool_whose_shaft_begins_in_an_object_is_refused_with_its_depth() -> None:
     robot = load_robot("rcrt1")
     T = robot.fk(robot.home)

@@ -11,7 +11,7 @@ from scipy.interpolate import CubicHermiteSpline
 
 import teleop_core as tc
 from present import present
-from teleop_core.base import ParameterError, build
+from teleop_core.base import build
 from teleop_core.hand.operators import OPERATORS, Setting
 from teleop_core.hand.operators.behaviour import OperatorParameters
 from teleop_core.hand.operators.shapes import PHASES
@@ -87,13 +87,6 @@ def test_turning_of_the_stylus_does_not_depend_on_the_time_of_a_leg_nor_places_o
 
 def test_session_lasts_as_long_as_the_tour() -> None:
     assert motion()[1] == pytest.approx(1.0 + 4 * (1.0 + 0.6) + 13.8)
-
-
-def test_no_points_at_all_are_refused() -> None:
-    part = OPERATORS.find("tour")
-    setting = Setting(common=OperatorParameters(), phases=np.zeros(PHASES), seed=1)
-    with pytest.raises(ParameterError, match="at least one point"):
-        part.make(TourParameters(), setting)
 
 
 def test_scenario_has_24_different_points_and_takes_the_published_time() -> None:

@@ -145,21 +145,6 @@ def test_a_file_says_the_same_as_python(tmp_path: Path) -> None:
     assert read_tuning(file_of(tmp_path, text)).run(trials=2, jobs=1) == tuning().run(trials=2, jobs=1)
 
 
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("tune: {coarse_gain: 1.0}\nminimize: task.time_s", "a list of choices, or"),
-        ("tune: {coarse_gain: {low: 0.1}}\nminimize: task.time_s", "a list of choices, or"),
-        ("tune: {coarse_gain: {low: 0.1, high: 1.0}}", "key of a score"),
-        ("sweep: {coarse_gain: [0.1]}", "tune"),
-        ("[", "YAML"),
-    ],
-)
-def test_a_wrong_file_is_refused_with_what_must_be_there(text: str, words: str, tmp_path: Path) -> None:
-    with pytest.raises(tc.TeleopError, match=words):
-        read_tuning(file_of(tmp_path, text))
-
-
 def test_the_command_prints_the_best_values_and_writes_page_and_numbers(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -1,15 +1,12 @@
 """Drives of a URDF from a YAML file: above what the URDF says, kept by recordings."""
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import pytest
 import yaml
 
 import teleop_core as tc
 from present import present
-from teleop_core.base.errors import ParameterError, RecordingError, UnknownNameError
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import drives, load_robot
 
@@ -57,39 +54,3 @@ def test_a_motor_adds_its_inertia_to_that_of_the_links_in_either_model(tmp_path:
             return np.linalg.inv(np.array(rows))
 
         np.testing.assert_allclose(inertia(found) - inertia(plain), np.diag(motors), atol=1e-9, err_msg=dynamics)
-
-
-WRONG = {
-    "joint": ("wrist: {inertia: 1.0}", UnknownNameError, "drives joint is 'wrist'.* waist, "),
-    "entry": ("waist: {inertai: 1.0}", UnknownNameError, "waist entry is 'inertai'.* inertia, "),
-    "number": ("waist: {inertia: big}", ParameterError, "drives waist inertia is 'big'"),
-    "negative": ("waist: {coulomb: -1}", ParameterError, "drives waist coulomb is -1.*>= 0"),
-    "zero": ("waist: {effort_limit: 0}", ParameterError, "drives waist effort_limit is 0.*> 0"),
-    "list": ("[waist]", ParameterError, "a mapping from joint names"),
-    "stiff": ("waist: {inertia: 1e-4, coulomb: 9000}", ParameterError, "raise inertia or friction"),
-    "no yaml": ("{", RecordingError, "drives.yaml"),
-}
-
-
-@pytest.mark.parametrize(("content", "kind", "told"), WRONG.values(), ids=WRONG)
-def test_a_mistake_is_told_in_one_line(content: str, kind: type[tc.TeleopError], told: str, tmp_path: Path) -> None:
-    with pytest.raises(kind, match=told) as caught:
-        arm(tmp_path, content)
-    assert "\n" not in str(caught.value)
-
-
-@pytest.mark.parametrize("is_gone", [False, True])
-def test_a_recording_is_replayed_with_its_drives_whatever_became_of_their_file(is_gone: bool, tmp_path: Path) -> None:
-    arm(tmp_path, {"waist": {"speed_limit": 0.05}, "shoulder": {"viscous": 30.0}})
-    path = tmp_path / "drives.yaml"
-    geometry = ["tip=tool0", f"drives = {path}"]
-    session: dict[str, Any] = {"duration": 0.5, "robot": URDF, "geometry": geometry}
-    recording = tc.run("coarse_box", out=tmp_path / "bag", **session)
-    before = recording["slave/measured_js"].values
-    assert not np.array_equal(
-        before, tc.run("coarse_box", **session | {"geometry": ["tip=tool0"]})["slave/measured_js"].values
-    )
-    path.unlink() if is_gone else path.write_text("{}")
-    again = tc.replay(present(recording.path), out=tmp_path / "again")
-    np.testing.assert_array_equal(again["slave/measured_js"].values, before)
-    np.testing.assert_array_equal(tc.replay(present(again.path))["slave/measured_js"].values, before)

@@ -8,10 +8,8 @@ import palpation
 import teleop_core as tc
 from free_tool import after_a_tick
 from present import present
-from teleop_core.base.errors import ParameterError
 from teleop_core.graph.topics import SLAVE_TRUE_CF
 from teleop_core.robots import load_robot
-from teleop_core.session import configuration, virtual
 from teleop_core.slave.world.contents import MATERIALS
 
 BLOCK = [0.241, -0.236, -0.087]
@@ -114,20 +112,6 @@ def test_dry_friction_holds_a_tip_that_is_dragged_less_than_it_carries() -> None
         slips[friction] = np.median(across / force[:, 2])
     assert slips[0.0] == 0.0
     assert 0.05 < slips[2.0] < 2.0
-
-
-def test_an_object_that_the_tip_begins_in_is_refused_with_its_depth() -> None:
-    table, wall = ["world=plane"], ["world=plane", "world.plane.normal=[1.0,0.0,0.0]"]
-    with pytest.raises(ParameterError, match="mm inside"):
-        virtual.VirtualTime(configuration.configure("free_motion", settings=table))
-    with pytest.raises(ParameterError, match="cannot lie straight below"):
-        virtual.VirtualTime(configuration.configure("free_motion", settings=wall))
-    with pytest.raises(ParameterError, match="x, y, z, or empty"):
-        configuration.configure("free_motion", settings=["world=box", "world.place=[0.1,0.2]"])
-    with pytest.raises(ParameterError, match="given for scara_stewart"):
-        virtual.VirtualTime(configuration.configure("free_motion", settings=["world=box", "robot=scara_stewart"]))
-    with pytest.raises(ParameterError, match="a direction"):
-        configuration.configure("free_motion", settings=["world=plane", "world.plane.normal=[0.0,0.0,0.0]"])
 
 
 def test_the_hand_feels_the_push_along_its_own_axes_and_no_more_than_asked() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from present import present
-from teleop_core.base.errors import ParameterError, RecordingError, UnknownNameError
+from teleop_core.base.errors import ParameterError
 from teleop_core.robots import load_robot, load_robot_set
 from teleop_core.robots.files import xacro_files
 from teleop_core.robots.robot import Robot
@@ -72,46 +72,6 @@ def test_packages_are_found_where_meshes_are(tmp_path: Path, monkeypatch: pytest
     same(load_robot(str(path), tip="tool0"), load_robot(str(EXAMPLE), tip="tool0"))
 
 
-@pytest.mark.parametrize(
-    ("place", "word"),
-    [
-        ('<xacro:place x="${1 / 0}"/>', "division by zero"),
-        ("<xacro:place/>", "Undefined parameters"),
-        ("<xacro:spot/>", "spot"),
-        ('<origin xyz="$(arg depth) 0 0"/>', "depth"),
-        ('<origin xyz="${__import__(1)} 0 0"/>', "__import__"),
-        ('<origin xyz="$(find ..)"/>', "package is '..'"),
-        ('<origin xyz="$(find nowhere) 0 0"/>', "package is 'nowhere'"),
-        ('<xacro:include filename="$(find nowhere)/a.xacro"/>', "package is 'nowhere'"),
-        ("<x a=\"${xacro.load_yaml('$(find nowhere)/a.yaml')}\"/>", "package is 'nowhere'"),
-    ],
-)
-def test_a_mistake_in_a_xacro_is_told_in_one_line_that_names_the_file(place: str, word: str, tmp_path: Path) -> None:
-    path = arm(tmp_path, place=place)
-    with pytest.raises(ParameterError) as told:
-        load_robot(str(path), tip="tool0")
-    assert word in str(told.value)
-    assert path.name in str(told.value)
-    assert "\n" not in str(told.value)
-    assert "<class" not in str(told.value)
-
-
-def test_macros_in_a_file_that_is_called_urdf_are_told(tmp_path: Path) -> None:
-    path = arm(tmp_path).rename(tmp_path / "arm.urdf")
-    with pytest.raises(ParameterError, match=r"<xacro:.*> must be|call it \.xacro"):
-        load_robot(str(path), tip="tool0")
-
-
-def test_what_no_file_declares_and_what_is_no_xacro_takes_no_argument(tmp_path: Path) -> None:
-    path = arm(tmp_path)
-    with pytest.raises(UnknownNameError, match=r"prefx.*prefix, height"):
-        load_robot(str(path), tip="tool0", **{"xacro.prefx": "left_"})
-    with pytest.raises(ParameterError, match=r"is no \.xacro"):
-        load_robot(str(EXAMPLE), tip="tool0", **{"xacro.prefix": "left_"})
-    with pytest.raises(RecordingError, match=r"gone\.xacro"):
-        load_robot(str(tmp_path / "gone.xacro"))
-
-
 def test_entities_of_a_xacro_and_of_what_it_includes_are_refused(tmp_path: Path) -> None:
     path = arm(tmp_path)
     parts = path.parent / "parts.xacro"
@@ -134,18 +94,6 @@ def test_without_the_package_one_line_says_how_to_get_it(tmp_path: Path) -> None
     told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert told.stdout.startswith("TeleopError")
     assert "pip install 'teleop_core[urdf]'" in told.stdout
-
-
-@pytest.mark.parametrize(("file", "line"), [("keys.txt", ""), ("keys.yaml", "line 2")])
-def test_error_of_a_loaded_file_names_the_file_and_never_quotes_it(file: str, line: str, tmp_path: Path) -> None:
-    secret = tmp_path / file
-    secret.write_text("user: me\nkey: *hunter2\n")
-    path = arm(tmp_path, place=f"<x a=\"${{xacro.load_yaml('{secret}')}}\"/>")
-    with pytest.raises(ParameterError) as told:
-        load_robot(str(path), tip="tool0")
-    assert file in str(told.value)
-    assert line in str(told.value)
-    assert "hunter2" not in str(told.value)
 
 
 @pytest.mark.parametrize(

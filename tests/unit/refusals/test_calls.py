@@ -22,16 +22,20 @@ from teleop_core.coupling.mapping.gains import FixtureParameters
 from teleop_core.coupling.mapping.jaw_command import JawCommandParameters
 from teleop_core.graph.graph import Delay
 from teleop_core.hand.master.master_bridge import POSE_MESSAGES, MasterBridgeParameters
+from teleop_core.hand.operators import OPERATORS, Setting
 from teleop_core.hand.operators.behaviour import OperatorParameters
 from teleop_core.hand.operators.behaviour import PressParameters as HandButtons
 from teleop_core.hand.operators.human import HumanParameters
 from teleop_core.hand.operators.remote import RemoteHand
+from teleop_core.hand.operators.shapes import PHASES
 from teleop_core.hand.operators.tour import TourParameters
 from teleop_core.hand.tasks.insert import InsertParameters
 from teleop_core.kernels.geometry import checked_array
-from teleop_core.robots import load_robot, parse_table, robot_from_table
+from teleop_core.nodes.launching import COMMON, ONE_ARM, processes
+from teleop_core.robots import dexterity, load_robot, parse_table, robot_from_table
 from teleop_core.robots.arms.as_chain import true_chain
 from teleop_core.robots.arms.rcrt1_hardware import tendon_joint_angles, tendon_motor_angles
+from teleop_core.robots.bodies import Solid, bodies_of
 from teleop_core.robots.drives import ENTRIES, Drives, independent_axes
 from teleop_core.robots.hardware import Hardware
 from teleop_core.robots.inertias import LinkInertia, check_possible
@@ -41,8 +45,10 @@ from teleop_core.shapes.capsule import CapsuleParameters
 from teleop_core.shapes.cone import ConeParameters
 from teleop_core.shapes.cylinder import CylinderParameters
 from teleop_core.shapes.half_space import HalfSpaceParameters
+from teleop_core.shapes.height_field import HEIGHT_FIELD, HeightFieldParameters
 from teleop_core.shapes.hole import HoleParameters
 from teleop_core.shapes.line import LineParameters
+from teleop_core.shapes.mesh import MESH, MeshParameters
 from teleop_core.shapes.path import PathParameters
 from teleop_core.shapes.plane import PlaneParameters
 from teleop_core.slave.bridges.jaw_bridge import JawBridgeParameters
@@ -63,7 +69,8 @@ from teleop_machines.three_finger_hand import Hand
 
 TABLE: dict[str, Any] = {"name": "a", "convention": "modified", "angles": "degrees", "rows": [{"theta": "q"}]}
 CHAIN = TABLE | {"rows": [{"theta": "q", "lower": -150, "upper": 150}]}
-ZERO, Q = (0.0, 0.0, 0.0), np.zeros((3, 6))
+ZERO, Q, POSE = (0.0, 0.0, 0.0), np.zeros((3, 6)), np.array((0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0))
+RPS3, SCARA, TOUR = load_robot("rps3"), load_robot("scara"), OPERATORS.find("tour")
 BOX = LinkInertia(name="box", mass=1.0, center=np.zeros(3), inertia=np.eye(3))
 
 
@@ -88,6 +95,10 @@ def printed(content: Any) -> object:
 
 
 operator, operation, lag = built(OperatorParameters), built(OperationParameters), built(ReferenceFilterParameters)
+
+
+def launched(**values: str) -> dict[str, str]:
+    return {name: default for name, (default, _) in (COMMON | ONE_ARM).items()} | values
 
 
 def joints(**values: object) -> object:
@@ -237,6 +248,28 @@ CASES = [
     (partial(Delay.parse, "=0.1"), "^teleop.delays is '=0.1'"),
     *of(RecordingParameters, "topic=n", every_of=("slave/measured_js",)),
     *of(RecordingParameters, "topic=n", every_of=("slave/measured_js=0",)),
+    *((partial(part.numbers, group), rf"^{part.name}\.file is.*a file with")
+      for part, group in ((HEIGHT_FIELD, HeightFieldParameters()), (MESH, MeshParameters()))),
+    *((partial(processes, launched(**{name: value})), name)
+      for name, value in (("log_level", "loud"), ("record", "perhaps"), ("processes", ""))),
+    (partial(TOUR.make, TourParameters(), Setting(OperatorParameters(), np.zeros(PHASES), 1)), "at least one point"),
+    # arms
+    *((partial(call, q), told) for call in (RPS3.fk, RPS3.solve_fk, RPS3.fk_all, RPS3.follow_fk, RPS3.jacobian)
+      for q, told in (([1.2, math.nan, 1.2], "is"), ([1.2, 1.2], "must have shape"))),
+    (partial(RPS3.fk_all, np.ones((2, 3))), "must have shape"),
+    (partial(RPS3.solve_fk, np.ones((2, 3)), np.tile(np.eye(4), (3, 1, 1))), "must have shape"),
+    (partial(RPS3.solve_fk, RPS3.home, 2.0 * np.eye(4)), "rigid"),
+    (partial(RPS3.fk, [RPS3.home, [0.1, 0.1, 5.0]]), r"q\[1\].*solve_fk"),
+    (partial(RPS3.jacobian, [0.1, 0.1, 5.0]), "^q is"),
+    *((partial(dexterity.sample_workspace, SCARA, count, np.random.default_rng(0)), "count") for count in (0, 10**12)),
+    *((partial(dexterity.singular_values, SCARA, [0.0, 1.0, 0.1, 0.0], length), "^length is")
+      for length in (0.0, math.nan)),
+    (partial(bodies_of(tc.load_robot("rcrt1")).poses, np.zeros(5)), r"\(6,\)"),
+    (partial(Solid, "box", (1.0, 2.0), POSE, "link"), "must have shape"),
+    (partial(Solid, "sphere", (-1.0,), POSE, "link"), "^size of a sphere is"),
+    (partial(Solid, "sphere", (1.0,), np.zeros(3), "link"), "must have shape"),
+    *((partial(parse_table(TABLE).link_transforms, q), words)
+      for q, words in (([0.0, 1.0], "must have shape"), ([math.nan], "is"))),
     # the console
     *((partial(Guard, 8080, token), "token") for token in ("", "two words", "a;b", "a&b", "a=b", "ä", 'a"b', "a\nb")),
     *((partial(listen, "127.0.0.1", port), f"^port is {port}") for port in (65536, -1)),

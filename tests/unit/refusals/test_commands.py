@@ -12,7 +12,9 @@ import teleop_exchange
 from teleop_core.commands import cli
 
 ROOT = Path(__file__).resolve().parents[3]
-FILES = {"open.json": "{", "cut.json": '{"version": 1', "deep.json": "[" * 5}
+SCHEDULES = {"open.json": "{", "cut.json": '{"version": 1', "deep.json": "[" * 5}
+PARTS = {"divides.py": "x = 1\n\ny = x / 0\n", "reads.py": "import json\njson.loads('{')\n",
+         "lacks.py": "import nothing_of_this_name\n", "open.py": "x = (\n"}  # fmt: skip
 CASES = [
     # command, words of the line
     ("", r"^teleop: a COMMAND is missing \(see teleop --help\)"),
@@ -31,6 +33,11 @@ CASES = [
     ("live --out out --processes two", '^teleop live: Invalid value "two" for --processes. Choose'),
     ("evaluate", '^teleop evaluate: Command "evaluate" parameter BAGS requires an argument'),
     ("stop --domain 300", "^teleop stop: --domain is '300', must be the number of a ROS domain, 0 to 232"),
+    *((f"parts --parts {name}", rf"{name}.*{told}") for name, told in (
+        ("divides.py", r"ZeroDivisionError: division by zero \(line 3\)"),
+        ("reads.py", r"JSONDecodeError: .* \(line 2\)"), ("lacks.py", r"ModuleNotFoundError: .* \(line 1\)"),
+        ("open.py", r"SyntaxError: .*line 1\)"))),
+    ("fit none.csv", "none.csv"), ("fit --json no/fit.json", "make it first"),
     ("robot r2d2", "rcrt1"), ("parameters nobody", "motion_scaling"), ("console --out bag", "exists already"),
     ("import hand.csv --out out --position a y z", "t, x, y, z"), ("import nothing.csv --out out", "does not exist"),
     ("import hand.csv --out out --unit km", "must be one of: m, auto, cm, mm, in"),
@@ -66,7 +73,7 @@ ROS = [
     ("drill --search store --seed today", "seed"), ("drill --seeds 2 stop_topic", "without names"),
     ("drill --seed 3 stop_topic", "with --simulated"),
     *((f"drill --seeds {count}", f"--seeds is {count}, must be at least 1") for count in (0, -1)),
-    *((f"drill --schedule {name}", "JSON of a schedule") for name in FILES),
+    *((f"drill --schedule {name}", "JSON of a schedule") for name in SCHEDULES),
     ("drill --schedule nowhere.json", "nowhere.json: cannot be read as a schedule"),
     *((f"{words} --domain 97", "given for") for words in (
         "topic hz", "param get slave", "param set slave mode", "service call")),
@@ -82,7 +89,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     np.savetxt(made / "hand.csv", rows, header="t,x,y,z", comments="", delimiter=",")
     teleop_exchange.import_recording(made / "hand.csv", made / "bag", unit="m")
     (made / "example").symlink_to(ROOT / "bags/example")
-    for name, text in FILES.items():
+    for name, text in (SCHEDULES | PARTS).items():
         (made / name).write_text(text, encoding="utf-8")
     return made
 

@@ -1,13 +1,16 @@
 """Settings that no session can have: each is refused in one line, by its name or with what is possible."""
 
 import re
+from itertools import product
 
 import pytest
 
 from teleop_core.base import ParameterError, PartError, TeleopError, UnknownNameError
 from teleop_core.session import virtual
 from teleop_core.session.configuration import configure
+from teleop_core.slave.controllers import CONTROLLERS
 
+ARMS = "teleop.arms=[right, left]"
 WAVE, YIELDS = "reflection.passivity=wave", "teleop.stages=[network,impedance,passivity]"
 CASES = [
     # scenario, settings, error, words of its text
@@ -35,7 +38,32 @@ CASES = [
         ("plant=real", "ideal, hardware"), ("plant.hardware.without=[rust]", "friction"),
         ("plant.hardware.coulomb=[1.0]", "6 values"), ("plant.hardware.coulomb=[-1.0,0,0,0,0,0]", "at least 0"),
         ("plant.hardware.weights=[m9=1]", "m2b_L0b"), ("plant.hardware.weights=[m2b_L0b=heavy]", "m2b_L0b=number"))),
+    *((None, ("plant=hardware", f"plant.hardware.gear_stiffness={gears}"), ParameterError, words) for gears, words in (
+        ([0.0, 0.0, 0.0, 0.0, 10.0, 0.0], "theta5.*all that it moves"),
+        ([1e7, 0.0, 0.0, 0.0, 0.0, 0.0], "theta1.*1500"))),
+    *((None, (f"slave_sim.{name}=[1.0, 1.0, 1.0, 1.0, 1.0]", *law), ParameterError, f"^slave_sim.{name} is")
+      for name, *law in (
+        ("viscous",), ("coulomb",), *((f"controller.pid.{name}", "controller=pid") for name in ("kp", "ki", "kd")),
+        *((f"controller.{law}.{'kp' if law == 'source_pid' else 'bandwidth'}", f"controller={law}")
+          for law in CONTROLLERS.names()))),
+    ("palpation", "robot=cubes.xml", ParameterError, "has a world"),
+    (None, ("robot=rcrt1", "plant=scene"), ParameterError, r"robot=SCENE\.xml"),
+    # arms
+    *((None, settings, TeleopError, words) for settings, words in (
+        ("teleop.arms=[left, left]", "left"), ("teleop.arms=[right, 'left arm']", "left arm"),
+        ((ARMS, "middle/seed=3"), "right, left"), ("left/seed=3", "left"),
+        ((ARMS, "left/slave_sim.robot=mma"), "left/inverse_kinematics"),
+        ((ARMS, "teleop.delays=[up/slave/servo_jp=0.1]"), "left/slave/servo_jp"))),
     # worlds and force
+    *(("free_motion", settings, ParameterError, words) for settings, words in (
+        ("world=plane", "mm inside"), (("world=plane", "world.plane.normal=[1.0,0.0,0.0]"), "straight below"),
+        (("world=box", "world.place=[0.1,0.2]"), "x, y, z, or empty"),
+        (("world=box", "robot=scara_stewart"), "given for scara_stewart"),
+        (("world=plane", "world.plane.normal=[0.0,0.0,0.0]"), "a direction"),
+        *((("world=box", *settings), "that of a needle") for settings in product(
+            ("world=button", "world.puncture_force=1.0"), ("world.tool_points=2", "world.tool_radius=0.001"))),
+        ("world.tool_points=17", "tool_points"), ("world.tool_points=0", "tool_points"),
+        ("world.tool_length=0.0", "tool_length"))),
     ("palpation", ("world=button", "world.puncture_force=1.0"), ParameterError, "puncture"),
     ("palpation", WAVE, ParameterError, r"teleop.stages=\[passivity\]"),
     ("palpation", (YIELDS, WAVE), ParameterError, "none, tank, tdpa with the stage impedance"),
