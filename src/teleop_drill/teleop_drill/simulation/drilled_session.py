@@ -33,10 +33,13 @@ from teleop_drill.drill.exercise import Master
 from teleop_drill.simulation import sometimes
 from teleop_drill.simulation.bus import Bus
 from teleop_drill.simulation.machine import Process
+from teleop_drill.simulation.owner import stamp_of
 from teleop_drill.simulation.platform import SimulatedPlatform
 from teleop_drill.simulation.session import SimulatedSession
 
 _FRESH_NS = 200_000_000
+_OBEYED_NS = 10_000_000_000
+"""Age of a command that an arm obeys no more, with some reserve [ns]."""
 
 
 class DrilledSession:
@@ -126,7 +129,10 @@ class DrilledSession:
                 self.sometimes[f"fault {SlaveFault(fault).word}"] += 1
 
     def _note_command(self, taken: Taken) -> None:
-        """Note a command of CRTK, which is the last text of its message."""
+        """Note a command of CRTK, which is the last text of its message, unless it is too old to be obeyed."""
+        stamp_ns = stamp_of(taken)
+        if stamp_ns and abs(self.platform.time_ns() - stamp_ns) > _OBEYED_NS:
+            return
         self.asked.append(taken.data.rstrip(b"\0").rpartition(b"\0")[2].decode("utf-8", "replace"))
 
     def _note_state(self, taken: Taken) -> None:
