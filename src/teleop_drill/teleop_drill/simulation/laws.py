@@ -297,8 +297,7 @@ class Laws:
         elif works and process is not None:
             self._worked += 1e-9 * _LOOK_NS
             silence = 1e-9 * (self._scheduler.now_ns - self._owner.followed_ns)
-            if self._stage.is_alone:
-                self._changes.judge(slave, self._worked, self._late(), silence)
+            self._changes.judge(slave, self._worked, self._late(), silence)
             self._judge_state(slave)
             self._judge_stop(slave, process)
         self._judge_ends()
