@@ -1,12 +1,14 @@
 """Exercises with actions of people: stop buttons, silent buttons, wrong parameters."""
 
 import math
+from collections.abc import Callable
 from functools import partial
+from typing import Any
 
 from teleop_core.graph.operation import State
 from teleop_core.slave.operation import Fault
 from teleop_drill.drill import hand
-from teleop_drill.drill.exercise import AllowedMotion, Cure, Exercise, Rig, Time, after, at_once
+from teleop_drill.drill.exercise import AllowedMotion, Cure, Exercise, Rig, Time, after, at_once, nothing
 from teleop_drill.drill.inside import RACES, STICKS, WORKS
 
 HEARTBEAT = 0.5
@@ -158,6 +160,14 @@ def _let_go(rig: Rig) -> None:
 _STUCK = (Fault.TRACKING, Fault.TIP, Fault.EFFORT, Fault.OVERSPEED)
 
 
+def _stopped(name: str, text: str, inject: Callable[[Rig], None], **more: Any) -> Exercise:
+    """Exercise in which a stop ends the motion at once, and only a reset ends the fault."""
+    values: dict[str, Any] = {"undo": _release, "allowed": at_once, "told": at_once} | more
+    return Exercise(
+        name=name, text=text, inject=inject, states=(State.FAULT,), faults=(Fault.STOP,), cures=(Cure.RESET,), **values
+    )
+
+
 def _stuck(fault: Fault, told: Time) -> Exercise:
     """Exercise with joints that stick, for one fault; other faults that detect this are set to be only reported.
 
@@ -190,52 +200,18 @@ def _take_good_gains(rig: Rig) -> None:
 
 
 STOPS = (
-    Exercise(
-        name="stop_topic", text="emergency stop by topic", inject=_press, undo=_release,
-        states=(State.FAULT,), faults=(Fault.STOP,), cures=(Cure.RESET,), allowed=at_once,
-        told=at_once, watch=0.2, repeats=20,
-    ),
-    Exercise(
-        name="stop_brief", text="stop pressed and released while the slave stands still",
-        inject=_press_briefly, undo=_release, states=(State.FAULT,), faults=(Fault.STOP,),
-        cures=(Cure.RESET,), allowed=at_once, told=at_once,
-    ),
-    Exercise(
-        name="stop_service", text="emergency stop by service", inject=_call,
-        states=(State.FAULT,), faults=(Fault.STOP,), cures=(Cure.RESET,), allowed=after(_SERVICE),
-        told=after(_SERVICE),
-    ),
-    Exercise(
-        name="stop_latched",
-        text="reset while the stop is pressed; then released, enable and resume without reset",
-        inject=_press_while_masked, undo=_release, said=_REFUSED,
-        states=(State.FAULT,), faults=(Fault.STOP,), cures=(Cure.RESET,), allowed=at_once,
-        told=at_once,
-    ),
-    Exercise(
-        name="stop_two", text="stop pressed by one button, released by another, reset",
-        inject=_press_two, undo=_release, said=_REFUSED,
-        states=(State.FAULT,), faults=(Fault.STOP,), cures=(Cure.RESET,), allowed=at_once,
-        told=at_once,
-    ),
-    Exercise(
-        name="stop_homing", text="stop pressed while the arm homes", inject=_press_homing, undo=_release,
-        states=(State.FAULT,), faults=(Fault.STOP,), cures=(Cure.RESET,), allowed=at_once,
-        told=at_once,
-    ),
-    Exercise(
-        name="stop_disabled",
-        text="stop pressed and released while the arm is disabled; then enable without reset",
-        inject=_press_disabled, undo=_release, said=_REFUSED,
-        states=(State.FAULT,), faults=(Fault.STOP,), cures=(Cure.RESET,), allowed=at_once,
-        told=at_once,
-    ),
-    Exercise(
-        name="stop_override", text="stop pressed, overridden by release, then enable without reset",
-        inject=_override, undo=_release, said=_REFUSED,
-        states=(State.FAULT,), faults=(Fault.STOP,), cures=(Cure.RESET,), allowed=at_once,
-        told=at_once,
-    ),
+    _stopped("stop_topic", "emergency stop by topic", _press, watch=0.2, repeats=20),
+    _stopped("stop_brief", "stop pressed and released while the slave stands still", _press_briefly),
+    _stopped("stop_service", "emergency stop by service", _call, undo=nothing, allowed=after(_SERVICE),
+             told=after(_SERVICE)),
+    _stopped("stop_latched", "reset while the stop is pressed; then released, enable and resume without reset",
+             _press_while_masked, said=_REFUSED),
+    _stopped("stop_two", "stop pressed by one button, released by another, reset", _press_two, said=_REFUSED),
+    _stopped("stop_homing", "stop pressed while the arm homes", _press_homing),
+    _stopped("stop_disabled", "stop pressed and released while the arm is disabled; then enable without reset",
+             _press_disabled, said=_REFUSED),
+    _stopped("stop_override", "stop pressed, overridden by release, then enable without reset", _override,
+             said=_REFUSED),
     Exercise(
         name="heartbeat", text="one stop button of two falls silent (heartbeat 0.5 s)",
         inject=_miss_heartbeat, undo=_hear_again,
