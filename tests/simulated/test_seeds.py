@@ -20,9 +20,7 @@ from teleop_drill.simulation import seeds, sometimes
 from teleop_drill.simulation.planned import Schedule
 from teleop_drill.simulation.report import told
 from teleop_drill.simulation.schedules import KINDS, Fault, draw
-from teleop_drill.simulation.search import run_measured
 from teleop_drill.simulation.seeds import PROCESSES, run_seed, shrink
-from teleop_drill.simulation.visits import PLAIN, SESSIONS
 
 pytestmark = pytest.mark.slow
 SIDES = PROCESSES[Processes.SIDES]
@@ -136,20 +134,6 @@ def test_a_seed_is_known_once_each_of_its_faults_has_met_every_state() -> None:
     for state in State:
         met.update((one.kind, state.name) for one in draw(30, SIDES))
     assert seeds._known(30, met, Processes.SIDES) >= 1.0
-
-
-@pytest.mark.parametrize("session", SESSIONS)
-def test_all_laws_hold_in_each_kind_of_session_and_all_but_the_plain_one_are_visited(session: str) -> None:
-    found, branches = apart(partial(run_measured, Schedule(3, draw(3, SIDES)[:2], session=session)))
-    assert found.broken == ()
-    is_visited = any("remote_control" in name for name in branches)  # the visitor stops the arms now and then
-    assert is_visited is (session != PLAIN)
-
-
-def test_a_visited_schedule_has_the_same_result_again() -> None:
-    schedule = Schedule(8, draw(8, SIDES)[:1], session="visited")
-    first, again = (apart(partial(run_measured, schedule)) for _ in range(2))
-    assert first == again
 
 
 def test_a_schedule_has_the_same_result_first_in_a_process_and_in_a_copy_of_it() -> None:

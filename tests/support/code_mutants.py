@@ -937,7 +937,7 @@ CODE_MUTANTS = (
             "        if new or found.broken:", "        if new:", "tests/simulated/test_search.py"),
     _mutant("visitor_idle", "no client, display or supervisor uses a visited session",
             "teleop_drill/simulation/visits.py", "            if self.may_act and", "            if False and",
-            "tests/simulated/test_seeds.py"),
+            "tests/simulated/test_visits.py"),
     _mutant("unranked", "threads wait for their interpreter without priorities", "teleop_drill/simulation/scheduler.py",
             "            rank = what.rank\n", "            rank = 0.0\n", "tests/simulated/test_machine.py"),
     _mutant("rank_kept", "priorities of threads never change", "teleop_drill/simulation/scheduler.py",

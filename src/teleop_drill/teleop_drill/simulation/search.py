@@ -39,7 +39,7 @@ _AHEAD_OF_CLUSTER = 32
 _BREAKS = 0.0005
 _DEEP, _DEPTHS = 0.25, (1, 2, 2, 3, 4)
 """Share of schedules in which priorities of threads decide, and the depths of these."""
-_PLAIN = 0.4
+_PLAIN = 0.6
 """Share of schedules with the plain session at least; the others draw from all kinds."""
 _LEADS = {
     State.DISABLED.name: ("reset", "disable"),

@@ -66,11 +66,12 @@ class Session:
     is_visited: bool = True
 
 
+_SCRIPT = "pause@6, resume@7, stop@9, reset@9.5, enable@9.6"
 SESSIONS = {
     PLAIN: Session(is_visited=False),
     "visited": Session(),
     "network": Session(texts=("teleop.stages=[network,display]", "network.there.least_delay=0.05")),
-    "task": Session("point", has_circle=False),
+    "task": Session("point", (f"slave.operation.events=[{_SCRIPT}]",), has_circle=False),
     "pair": Session("uva_board", has_circle=False),
     "person": Session(texts=("operator.kind=remote", "slave.start_speed=1.0"), has_circle=False),
 }

@@ -1,0 +1,30 @@
+"""Visits: in each kind of session the laws hold, and a program uses it as clients, displays and supervisors do."""
+
+from functools import partial
+
+import pytest
+
+from teleop_core.base.workers import apart
+from teleop_core.nodes.crews import Processes
+from teleop_drill.simulation.planned import Schedule
+from teleop_drill.simulation.schedules import draw
+from teleop_drill.simulation.search import run_measured
+from teleop_drill.simulation.seeds import PROCESSES
+from teleop_drill.simulation.visits import PLAIN, SESSIONS
+
+pytestmark = pytest.mark.slow
+SIDES = PROCESSES[Processes.SIDES]
+
+
+@pytest.mark.parametrize("session", SESSIONS)
+def test_all_laws_hold_in_each_kind_of_session_and_all_but_the_plain_one_are_visited(session: str) -> None:
+    found, branches = apart(partial(run_measured, Schedule(3, draw(3, SIDES)[:2], session=session)))
+    assert found.broken == ()
+    is_visited = any("remote_control" in name for name in branches)  # the visitor stops the arms now and then
+    assert is_visited is (session != PLAIN)
+
+
+def test_a_visited_schedule_has_the_same_result_again() -> None:
+    schedule = Schedule(8, draw(8, SIDES)[:1], session="visited")
+    first, again = (apart(partial(run_measured, schedule)) for _ in range(2))
+    assert first == again
