@@ -7,13 +7,32 @@ import pytest
 from teleop_core.base.workers import apart
 from teleop_core.nodes.crews import Processes
 from teleop_drill.simulation.planned import Schedule
-from teleop_drill.simulation.schedules import draw
+from teleop_drill.simulation.schedules import Fault, draw
 from teleop_drill.simulation.search import run_measured
 from teleop_drill.simulation.seeds import PROCESSES
-from teleop_drill.simulation.visits import PLAIN, SESSIONS
+from teleop_drill.simulation.visits import PLAIN, SESSIONS, Visitor
 
 pytestmark = pytest.mark.slow
 SIDES = PROCESSES[Processes.SIDES]
+
+
+@pytest.mark.parametrize("node", ["haptic_master", "motion_scaling"])
+def test_a_node_that_a_supervisor_makes_anew_between_two_ticks_is_connected_again(
+    node: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """All four changes of state come in one turn of the executor: the loop sees the node at work before and after."""
+
+    def change(self: Visitor) -> int:
+        while not self.may_act:
+            self.listen()
+        self.change(node, ("deactivate", "cleanup", "configure", "activate"))
+        while True:
+            self.listen()
+
+    monkeypatch.setattr(Visitor, "run", change)
+    found = Schedule(1, (Fault(2.0, "hiccups", "", 0.1, 0.3),), session="visited").run()
+    assert found.broken == ()
+    assert found.seconds < 15.0
 
 
 @pytest.mark.parametrize("session", SESSIONS)

@@ -938,6 +938,8 @@ CODE_MUTANTS = (
     _mutant("visitor_idle", "no client, display or supervisor uses a visited session",
             "teleop_drill/simulation/visits.py", "            if self.may_act and", "            if False and",
             "tests/simulated/test_visits.py"),
+    _mutant("links_stale", "a node that was made anew between two ticks is not connected again", "nodes/loop.py",
+            "node.starts if node.is_at_work else 0 for", "node.is_at_work for", "tests/simulated/test_visits.py"),
     _mutant("unranked", "threads wait for their interpreter without priorities", "teleop_drill/simulation/scheduler.py",
             "            rank = what.rank\n", "            rank = 0.0\n", "tests/simulated/test_machine.py"),
     _mutant("rank_kept", "priorities of threads never change", "teleop_drill/simulation/scheduler.py",

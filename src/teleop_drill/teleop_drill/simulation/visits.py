@@ -5,6 +5,7 @@ presses a stop, at random times and with random values, some of which are refuse
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -120,11 +121,23 @@ class Visitor:
         )  # fmt: skip
         monotonic_ns, next_ns = self._platform.monotonic_ns, 0
         while True:
-            self._executor.spin_once(timeout_sec=0.5 * _REST)
+            self.listen()
             if self.may_act and monotonic_ns() >= next_ns:
                 next_ns = monotonic_ns() + round(1e9 * self._random.expovariate(1.0 / _REST))
                 (act,) = self._random.choices([one for one, _ in acts], [weight for _, weight in acts])
                 act()
+
+    def listen(self) -> None:
+        """Answer what comes, or wait a moment."""
+        self._executor.spin_once(timeout_sec=0.5 * _REST)
+
+    def change(self, member: str, labels: Sequence[str]) -> None:
+        """Ask a node for changes of its state, one after the other."""
+        client = self._node.create_client(ChangeState, f"/{member}/change_state")
+        for label in labels:
+            request = ChangeState.Request()
+            request.transition.label = label
+            client.call_async(request)
 
     # -- what a hand and a client do -------------------------------------------------------------
 
@@ -200,13 +213,8 @@ class Visitor:
     def _cycle(self) -> None:
         """Let a node go through its states; the arm stays at work, for an operator would bring it back."""
         members = [one for one in self._members if one.rpartition("/")[2] not in {"slave", "slave_sim"}]
-        member = self._random.choice((*members, RECORDER_NAME))
-        client = self._node.create_client(ChangeState, f"/{member}/change_state")
         labels = ("deactivate", "activate"), ("deactivate", "cleanup", "configure", "activate")
-        for label in self._random.choice(labels):
-            request = ChangeState.Request()
-            request.transition.label = label
-            client.call_async(request)
+        self.change(self._random.choice((*members, RECORDER_NAME)), self._random.choice(labels))
 
     def _press(self) -> None:
         """Stop all arms as ``teleop stop`` does, and let them go on."""
