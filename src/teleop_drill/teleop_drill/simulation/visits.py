@@ -31,8 +31,6 @@ from teleop_core.graph.topics import (
     OPERATOR_SERVO_CP,
     SLAVE_MEASURED_CF,
     SLAVE_OPERATION,
-    SLAVE_SERVO_CP,
-    SLAVE_SERVO_JP,
     STREAMS,
     Kind,
     Topic,
@@ -79,11 +77,11 @@ SESSIONS = {
 """Kinds of sessions, by name."""
 _PERIOD = 0.02  # time between two poses of a person [s]
 _REST = 0.03  # mean time between two actions [s]
-_ARM = ("move_jp", "move_jr", "interpolate_jp", "servo_jr", "servo_jp", "servo_jv")
-_TIP = ("move_cp", "interpolate_cp", "servo_cp")
+_ARM = ("move_jp", "move_jr", "interpolate_jp", "servo_jr", "servo_jv")
+_TIP = ("move_cp", "interpolate_cp")  # the faults `intruder` and `garbage` send streams beside the session's own
 _READ = (*STREAMS, GOAL_JS, GOAL_CP, MEASURED_CV, BODY_CF, SPATIAL_CF, MARKERS)
 _OTHERWISE = (
-    SLAVE_MEASURED_CF, SLAVE_SERVO_CP, SLAVE_SERVO_JP, OPERATOR_SERVO_CP, MASTER_SERVO_CF, SLAVE_OPERATION, DIAGNOSTICS,
+    SLAVE_MEASURED_CF, OPERATOR_SERVO_CP, MASTER_SERVO_CF, SLAVE_OPERATION, DIAGNOSTICS,
 )  # fmt: skip
 _RECORDER = ("start", "stop", "split", "mark")
 _JOINTS = tuple(f"other_{k}" for k in range(6))
