@@ -3,12 +3,14 @@
     python benchmarks/search.py --minutes 5              # of processor time for each
     python benchmarks/search.py --cost 6                 # the same schedules with and without marks
     python benchmarks/search.py --unmet out/search       # branches that no schedule of a store met
+    NUMBA_DISABLE_JIT=1 python benchmarks/search.py --unmet out/search --again 8    # and of kernels of slave/operation
 
 Dice are schedules of successive seeds, the rarest of each three, as of ``teleop drill --seeds``. The first schedule of
 a process loads the kernels and is not counted.
 """
 
 import argparse
+import os
 import resource
 import tempfile
 from collections.abc import Iterator, Sequence
@@ -16,11 +18,12 @@ from pathlib import Path
 
 import numpy as np
 
+from teleop_core.base.workers import workers
 from teleop_core.nodes.crews import Processes
 from teleop_drill.simulation.branches import Branches
 from teleop_drill.simulation.planned import Schedule
 from teleop_drill.simulation.schedules import draw
-from teleop_drill.simulation.search import Search
+from teleop_drill.simulation.search import Search, run_measured
 from teleop_drill.simulation.seeds import PROCESSES, Starts, rarest, run_seed
 from teleop_drill.simulation.store import Store, kind_of
 
@@ -84,11 +87,24 @@ def cost(count: int, seed: int) -> None:
     print(f"marks: {100.0 * (np.median(ratio) - 1.0):.1f} % more processor time, median of {count} schedules")
 
 
-def unmet(folder: Path) -> None:
-    """Branches of ``nodes`` and ``bags`` that no schedule of a store met: a line for each file."""
+def again(store: Store, count: int) -> None:
+    """Add the branches of some kept schedules to a store's counts, in memory: without a compiler, those of kernels too.
+
+    The schedules are those that met the most events first. Each takes about a minute without a compiler.
+    """
+    kept = sorted(store.kept, key=lambda one: -sum(kind_of(name) == "events" for name in one.new))[:count]
+    with workers(len(os.sched_getaffinity(0))) as pool:
+        for _, branches in pool.map(run_measured, [one.schedule for one in kept]):
+            store.times.update(branches)
+
+
+def unmet(folder: Path, count: int) -> None:
+    """Branches that no schedule of a store met: a line for each file."""
     branches, store = Branches(), Store(folder)
     run_seed(0, ())
     branches.begin()
+    if count:
+        again(store, count)
     total: dict[str, list[str]] = {}
     for name in branches.names:
         file, _, place = name.partition(":")
@@ -110,9 +126,10 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0, help="first seed")
     parser.add_argument("--cost", type=int, default=0, help="schedules with and without marks, in place of the search")
     parser.add_argument("--unmet", type=Path, metavar="STORE", help="branches that no schedule of a store met")
+    parser.add_argument("--again", type=int, default=0, metavar="N", help="with --unmet: run N kept schedules again")
     given = parser.parse_args()
     if given.unmet is not None:
-        unmet(given.unmet)
+        unmet(given.unmet, given.again)
         return
     run_seed(given.seed, ())
     if given.cost:

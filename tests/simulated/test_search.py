@@ -384,3 +384,4 @@ def test_a_search_tells_what_was_never_met_and_goes_on_in_its_store(tmp_path: Pa
     assert "events were met; never: " in done.stdout
     assert "seeds from 6" in done.stdout
     assert f"{count} sessions" in done.stdout
+    assert done.stdout.splitlines()[-1] == f"seeds from 61 to {59 + count}, chosen from --seed 60"

@@ -17,12 +17,10 @@ from teleop_core.graph.operation import State
 from teleop_core.nodes.crews import Processes
 from teleop_core.nodes.operation import StopInput
 from teleop_drill.simulation import seeds, sometimes
-from teleop_drill.simulation.branches import Branches
 from teleop_drill.simulation.planned import Schedule
 from teleop_drill.simulation.report import told
 from teleop_drill.simulation.schedules import KINDS, Fault, draw
 from teleop_drill.simulation.seeds import PROCESSES, Starts, run_seed, shrink
-from teleop_drill.simulation.visits import PLAIN, SESSIONS
 
 pytestmark = pytest.mark.slow
 SIDES = PROCESSES[Processes.SIDES]
@@ -157,21 +155,6 @@ def test_a_recording_has_the_same_bytes_in_whichever_folder_it_lies(tmp_path: Pa
         run_seed(5, (), folder)
         files.append((folder / "recording_1" / "recording_1_0.mcap").read_bytes())
     assert files[0] == files[1]
-
-
-@pytest.mark.parametrize("session", SESSIONS)
-def test_all_laws_hold_in_each_kind_of_session_and_all_but_the_plain_one_are_visited(session: str) -> None:
-    with closing(Starts(Branches())) as starts:
-        found, branches = Schedule(3, draw(3, SIDES)[:2], session=session).run_in(starts)
-    assert found.broken == ()
-    is_visited = any("remote_control" in name for name in branches)  # the visitor stops the arms now and then
-    assert is_visited is (session != PLAIN)
-
-
-def test_a_visited_schedule_has_the_same_result_again() -> None:
-    schedule = Schedule(8, draw(8, SIDES)[:1], session="visited")
-    with closing(Starts()) as starts:
-        assert schedule.run_in(starts)[0] == schedule.run()
 
 
 def test_a_schedule_in_which_priorities_decide_has_the_same_result_again() -> None:

@@ -18,7 +18,7 @@ Octets = np.ndarray[Any, np.dtype[np.uint8]]
 
 
 def _array(address: int, count: int, kind: Any) -> Any:
-    return np.ctypeslib.as_array((kind * count).from_address(address))
+    return np.ctypeslib.as_array((kind * int(count)).from_address(int(address)))
 
 
 def floats(address: int, count: int) -> Array:

@@ -52,7 +52,7 @@ class CoreNode(LoopNode):
         """Loop of the node, which a session gives to its nodes; an active node without one makes its own."""
         self.tells_strain = True
         """Whether the reports of this node say that its loop has given way; one node of a session does."""
-        self.is_at_work = self.has_worked = False
+        self.is_at_work, self.starts = False, 0
         self._own: LiveLoop | None = None
         self.ports = NO_PORTS
         self._own_publishers: list[Publisher] = []
@@ -227,7 +227,8 @@ class CoreNode(LoopNode):
             entry.forget()
         self._reported = b"", None
         self.start()
-        self.is_at_work = self.has_worked = True
+        self.is_at_work = True
+        self.starts += 1
         if self.loop is None:
             self._own = self.loop = LiveLoop(self.ros.get_name(), (self,), self.fail)
             self._own.start()

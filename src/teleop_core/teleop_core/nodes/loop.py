@@ -117,7 +117,8 @@ class LoopNode(TunedNode):
     gate: Any
     """Locked by the loop during a tick."""
     is_at_work: bool
-    has_worked: bool
+    starts: int
+    """Number of times that it began to work."""
     has_ended: bool
 
     def due(self) -> Sequence[int]:
@@ -192,7 +193,7 @@ class LiveLoop(Loop):
         self._schedule, self._due = (last.schedule, last.due) if schedule is None else (schedule, schedule.due)
         self._taps = taps
         self._feed = Feed(_fed(nodes) if taps is None else (), last.platform)
-        self._at_work: tuple[bool, ...] = ()
+        self._at_work: tuple[int, ...] = ()
         self.phases, self.tick_ns, self.newest_ns, self.progress = Phases(*PHASES), 0, 0, 0
         for node in nodes:
             node.gate = self._gate
@@ -249,7 +250,8 @@ class LiveLoop(Loop):
             self._schedule.strain = last.schedule.strain
             self.is_ready = True
         with self._gate:
-            at_work = tuple(node.is_at_work for node in self._crew)
+            # A node may stop and start between two looks; its outputs are then new ones.
+            at_work = tuple(node.starts if node.is_at_work else 0 for node in self._crew)
             if at_work != self._at_work:
                 self._link()
                 self._at_work = at_work
@@ -260,7 +262,7 @@ class LiveLoop(Loop):
     def _are_all_there(self) -> bool:
         """Whether every node that starts by itself has been at work, so that no sample is missed."""
         waited_for = [node for node in self._crew if node.options.autostart and not node.has_ended]
-        return any(node.has_worked for node in self._crew) and all(node.has_worked for node in waited_for)
+        return any(node.starts for node in self._crew) and all(node.starts for node in waited_for)
 
     def _link(self) -> None:
         """Connect every stage's output to its readers in this process, if both are at work."""

@@ -252,7 +252,7 @@ def read(r: Reading, address: int, length: int) -> int:
         numbers = floats(address + _HEADER, (length - _HEADER) // 8)
         for i in range(r.width):
             row[i] = numbers[places[i]]
-    return head[1] * SECOND_NS + (head[2] & 0xFFFFFFFF)
+    return int(head[1]) * SECOND_NS + (int(head[2]) & 0xFFFFFFFF)
 
 
 @inner

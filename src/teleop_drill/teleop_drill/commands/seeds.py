@@ -111,6 +111,7 @@ def _search(folder: Path, options: Options) -> "Coverage":
     _show(console, store.coverage)
     for line in store.lines():
         print(line)
+    print(f"seeds from {first} to {options.seed + store.coverage.sessions - 1}, chosen from --seed {options.seed}")
     return store.coverage
 
 

@@ -2,7 +2,8 @@
 
 A tracer of Python makes a schedule four to five times as long. So this module compiles the functions of some packages
 again, with a mark at the begin of each branch, and gives them the marked code. A mark sets one byte. Kernels are
-compiled by Numba from their own source, and stay as they are.
+compiled by Numba from their own source, and stay as they are; with ``NUMBA_DISABLE_JIT=1`` they are Python functions,
+and have marks too.
 """
 
 import ast
@@ -11,7 +12,9 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from types import CodeType, FunctionType, ModuleType
 
-PACKAGES = ("teleop_core.nodes", "teleop_core.bags")
+from teleop_core.kernels import IS_COMPILED
+
+PACKAGES = ("teleop_core.nodes", "teleop_core.bags", "teleop_core.slave.operation")
 """Packages whose branches are marked."""
 _MARKS = "__branches__"
 _KERNELS = {"kernel", "inner"}
@@ -64,13 +67,13 @@ class Branches:
 
 
 class _Marker(ast.NodeTransformer):
-    """Puts a mark at the begin of each branch in functions that are no kernels."""
+    """Puts a mark at the begin of each branch in functions that are not compiled."""
 
     def __init__(self, place: str, names: list[str]) -> None:
         self._place, self._names, self._depth = place, names, 0
 
     def visit_FunctionDef(self, node: ast.FunctionDef) -> ast.AST:
-        if any(isinstance(one, ast.Name) and one.id in _KERNELS for one in node.decorator_list):
+        if IS_COMPILED and any(isinstance(one, ast.Name) and one.id in _KERNELS for one in node.decorator_list):
             return node
         self._depth += 1
         self.generic_visit(node)

@@ -42,7 +42,7 @@ _END = 5.0
 """Latest time of a drawn fault [s]: many faults at once need less time than one after the other."""
 _DEEP, _DEPTHS = 0.25, (1, 2, 2, 3, 4)
 """Share of schedules in which priorities of threads decide, and the depths of these."""
-_PLAIN = 0.4
+_PLAIN = 0.6
 """Share of schedules with the plain session at least; the others draw from all kinds."""
 _LEADS = {
     State.DISABLED.name: ("reset", "disable"),
@@ -279,7 +279,7 @@ def _submitting(cores: int | None, client: "Client | None") -> "Iterator[Callabl
     """Function that lets a process of this machine or of a cluster run a schedule."""
     if client is None:
         with workers(cores or len(os.sched_getaffinity(0)), warm) as pool:
-            yield lambda schedule: pool.submit(_run_apart, schedule)
+            yield lambda schedule: pool.submit(run_measured, schedule)
         return
     from distributed import KilledWorker
 
@@ -301,7 +301,8 @@ def _submitting(cores: int | None, client: "Client | None") -> "Iterator[Callabl
 _starts, _is_warm, _one_at_a_time = Starts(Branches()), False, Lock()
 
 
-def _run_apart(schedule: Schedule) -> Measured:
+def run_measured(schedule: Schedule) -> Measured:
+    """Run a schedule; returns its result and the branches that it ran."""
     return schedule.run_in(_starts)
 
 
@@ -313,4 +314,4 @@ def _run_there(schedule: Schedule, code: str) -> Measured:
         if not _is_warm:
             warm()
             _is_warm = True
-        return _run_apart(schedule)
+        return run_measured(schedule)

@@ -5,6 +5,7 @@ presses a stop, at random times and with random values, some of which are refuse
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -30,8 +31,6 @@ from teleop_core.graph.topics import (
     OPERATOR_SERVO_CP,
     SLAVE_MEASURED_CF,
     SLAVE_OPERATION,
-    SLAVE_SERVO_CP,
-    SLAVE_SERVO_JP,
     STREAMS,
     Kind,
     Topic,
@@ -66,22 +65,23 @@ class Session:
     is_visited: bool = True
 
 
+_SCRIPT = "pause@6, resume@7, stop@9, reset@9.5, enable@9.6"
 SESSIONS = {
     PLAIN: Session(is_visited=False),
     "visited": Session(),
     "network": Session(texts=("teleop.stages=[network,display]", "network.there.least_delay=0.05")),
-    "task": Session("point", has_circle=False),
+    "task": Session("point", (f"slave.operation.events=[{_SCRIPT}]",), has_circle=False),
     "pair": Session("uva_board", has_circle=False),
     "person": Session(texts=("operator.kind=remote", "slave.start_speed=1.0"), has_circle=False),
 }
 """Kinds of sessions, by name."""
 _PERIOD = 0.02  # time between two poses of a person [s]
 _REST = 0.03  # mean time between two actions [s]
-_ARM = ("move_jp", "move_jr", "interpolate_jp", "servo_jr", "servo_jp", "servo_jv")
-_TIP = ("move_cp", "interpolate_cp", "servo_cp")
+_ARM = ("move_jp", "move_jr", "interpolate_jp", "servo_jr", "servo_jv")
+_TIP = ("move_cp", "interpolate_cp")  # the faults `intruder` and `garbage` send streams beside the session's own
 _READ = (*STREAMS, GOAL_JS, GOAL_CP, MEASURED_CV, BODY_CF, SPATIAL_CF, MARKERS)
 _OTHERWISE = (
-    SLAVE_MEASURED_CF, SLAVE_SERVO_CP, SLAVE_SERVO_JP, OPERATOR_SERVO_CP, MASTER_SERVO_CF, SLAVE_OPERATION, DIAGNOSTICS,
+    SLAVE_MEASURED_CF, OPERATOR_SERVO_CP, MASTER_SERVO_CF, SLAVE_OPERATION, DIAGNOSTICS,
 )  # fmt: skip
 _RECORDER = ("start", "stop", "split", "mark")
 _JOINTS = tuple(f"other_{k}" for k in range(6))
@@ -119,11 +119,23 @@ class Visitor:
         )  # fmt: skip
         monotonic_ns, next_ns = self._platform.monotonic_ns, 0
         while True:
-            self._executor.spin_once(timeout_sec=0.5 * _REST)
+            self.listen()
             if self.may_act and monotonic_ns() >= next_ns:
                 next_ns = monotonic_ns() + round(1e9 * self._random.expovariate(1.0 / _REST))
                 (act,) = self._random.choices([one for one, _ in acts], [weight for _, weight in acts])
                 act()
+
+    def listen(self) -> None:
+        """Answer what comes, or wait a moment."""
+        self._executor.spin_once(timeout_sec=0.5 * _REST)
+
+    def change(self, member: str, labels: Sequence[str]) -> None:
+        """Ask a node for changes of its state, one after the other."""
+        client = self._node.create_client(ChangeState, f"/{member}/change_state")
+        for label in labels:
+            request = ChangeState.Request()
+            request.transition.label = label
+            client.call_async(request)
 
     # -- what a hand and a client do -------------------------------------------------------------
 
@@ -199,13 +211,8 @@ class Visitor:
     def _cycle(self) -> None:
         """Let a node go through its states; the arm stays at work, for an operator would bring it back."""
         members = [one for one in self._members if one.rpartition("/")[2] not in {"slave", "slave_sim"}]
-        member = self._random.choice((*members, RECORDER_NAME))
-        client = self._node.create_client(ChangeState, f"/{member}/change_state")
         labels = ("deactivate", "activate"), ("deactivate", "cleanup", "configure", "activate")
-        for label in self._random.choice(labels):
-            request = ChangeState.Request()
-            request.transition.label = label
-            client.call_async(request)
+        self.change(self._random.choice((*members, RECORDER_NAME)), self._random.choice(labels))
 
     def _press(self) -> None:
         """Stop all arms as ``teleop stop`` does, and let them go on."""
