@@ -6,7 +6,7 @@ from teleop_core.bags.messages import layout
 from teleop_core.graph.signals import DT
 from teleop_core.graph.topics import SLAVE_SETPOINT_JS
 from teleop_core.robots import load_robot
-from teleop_drill.simulation.steps import StepReader, Steps
+from teleop_drill.simulation.steps import StepReader, StepSpeeds
 
 
 def test_each_step_is_judged_wherever_blocks_of_setpoints_begin() -> None:
@@ -16,7 +16,7 @@ def test_each_step_is_judged_wherever_blocks_of_setpoints_begin() -> None:
     tips = np.array([robot.fk(one)[:3, 3] for one in q])
     speeds, ways = np.abs(np.diff(q, axis=0)) / DT, np.linalg.norm(np.diff(tips, axis=0), axis=1) / DT
     for size in (1, 2, 63, 64, 65, 200):
-        reader, every = StepReader(form, robot), list[Steps | None]()
+        reader, every = StepReader(form, robot), list[StepSpeeds | None]()
         for k, one in enumerate(q):
             reader.add(form.encode_one(k, one) + b"\0\0")  # rclpy pads the end of some messages
             if (k + 1) % size == 0 or k == len(q) - 1:

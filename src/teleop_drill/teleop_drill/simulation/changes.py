@@ -20,7 +20,7 @@ _ENABLED, _PAUSED_STATE, _FAULT = int(State.ENABLED), int(State.PAUSED), int(Sta
 _FOLLOWING = int(MotionSource.FOLLOWING)
 
 
-class Changes:
+class StateChanges:
     """Checks the laws ``asked``, ``pause``, and a part of ``stop`` in one session.
 
     Times are running times of the slave's process [s].

@@ -22,7 +22,7 @@ from teleop_core.slave.commands import CommandStatus
 from teleop_core.slave.velocity import MotionSource
 from teleop_drill.drill.numbers import Numbers
 from teleop_drill.simulation import sometimes
-from teleop_drill.simulation.changes import Changes
+from teleop_drill.simulation.changes import StateChanges
 from teleop_drill.simulation.drilled_session import DrilledSession
 from teleop_drill.simulation.machine import Process
 from teleop_drill.simulation.owner import Owner, stamp_of
@@ -150,7 +150,7 @@ class Laws:
         self._leader = b""
         self._engaged: tuple[int, list[float]] | None = None
         """When the arm began to follow [ns], and where the tip was then."""
-        self._changes = Changes(stage, numbers, self._count, self._break)
+        self._changes = StateChanges(stage, numbers, self._count, self._break)
         self._slow_ns: dict[Process, int] = {}  # time for which a process has had slow turns
         self._sent_ns: dict[bytes, list[int]] = {}  # times of sending, by publisher
         """Sending times of setpoints by the system's clock [ns], by publisher."""

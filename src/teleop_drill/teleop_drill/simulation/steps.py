@@ -12,7 +12,7 @@ from teleop_core.robots import Robot
 _BLOCK = 64  # number of setpoints that are judged together
 
 
-class Steps(NamedTuple):
+class StepSpeeds(NamedTuple):
     """Largest speeds between some successive setpoints.
 
     Attributes:
@@ -46,7 +46,7 @@ class StepReader:
         self._block.append(data[: self._form.size])
         return len(self._block) >= _BLOCK
 
-    def steps(self) -> Steps | None:
+    def steps(self) -> StepSpeeds | None:
         """Steps since the last call, also from the setpoint before; None without a setpoint that can be read."""
         if not self._block:
             return None
@@ -58,11 +58,11 @@ class StepReader:
         q = self._form.decode(rows)[1][:, : self._robot.n]
         if not np.isfinite(q).all():  # a setpoint that is not a number is infinitely fast
             self._last = None
-            return Steps(len(q), np.full(self._robot.n, np.inf), np.inf, self._robot.home)
+            return StepSpeeds(len(q), np.full(self._robot.n, np.inf), np.inf, self._robot.home)
         tips = self._robot.fk(q)[:, :3, 3]
         if self._last is not None:
             q, tips = np.vstack((self._last[0], q)), np.vstack((self._last[1], tips))
         self._last = q[-1], tips[-1]
         joints = np.abs(np.diff(q, axis=0)).max(axis=0, initial=0.0) / DT
         tip = np.linalg.norm(np.diff(tips, axis=0), axis=1).max(initial=0.0) / DT
-        return Steps(len(q) - 1, joints, float(tip), q[-1])
+        return StepSpeeds(len(q) - 1, joints, float(tip), q[-1])

@@ -49,7 +49,7 @@ PLAIN = "plain"
 
 
 @dataclass(frozen=True)
-class Session:
+class SessionKind:
     """Kind of session.
 
     Attributes:
@@ -67,12 +67,12 @@ class Session:
 
 _SCRIPT = "pause@6, resume@7, stop@9, reset@9.5, enable@9.6"
 SESSIONS = {
-    PLAIN: Session(is_visited=False),
-    "visited": Session(),
-    "network": Session(texts=("teleop.stages=[network,display]", "network.there.least_delay=0.05")),
-    "task": Session("point", (f"slave.operation.events=[{_SCRIPT}]",), has_circle=False),
-    "pair": Session("uva_board", has_circle=False),
-    "person": Session(texts=("operator.kind=remote", "slave.start_speed=1.0"), has_circle=False),
+    PLAIN: SessionKind(is_visited=False),
+    "visited": SessionKind(),
+    "network": SessionKind(texts=("teleop.stages=[network,display]", "network.there.least_delay=0.05")),
+    "task": SessionKind("point", (f"slave.operation.events=[{_SCRIPT}]",), has_circle=False),
+    "pair": SessionKind("uva_board", has_circle=False),
+    "person": SessionKind(texts=("operator.kind=remote", "slave.start_speed=1.0"), has_circle=False),
 }
 """Kinds of sessions, by name."""
 _PERIOD = 0.02  # time between two poses of a person [s]
