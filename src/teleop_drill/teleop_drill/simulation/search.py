@@ -138,7 +138,10 @@ class Search:
         """A kept schedule; one with rare events and few children has the largest weight."""
         times = self._store.times
         rare = [0.1 + sum(1.0 / (1.0 + times[name]) for name in one.new) for one in self._store.kept]
-        weights = [w / (1.0 + self._bred[one.schedule]) for w, one in zip(rare, self._store.kept, strict=True)]
+        weights = [
+            w / (1.0 + self._bred[one.schedule]) / SESSIONS[one.schedule.session].cost
+            for w, one in zip(rare, self._store.kept, strict=True)
+        ]
         (chosen,) = random.choices(self._store.kept, weights)
         self._bred[chosen.schedule] += 1
         return chosen.schedule
@@ -191,7 +194,10 @@ def _depth(random: Random) -> int:
 
 
 def _session(random: Random) -> str:
-    return PLAIN if random.random() < _PLAIN else random.choice(sorted(SESSIONS))
+    if random.random() < _PLAIN:
+        return PLAIN
+    (chosen,) = random.choices(sorted(SESSIONS), [1.0 / SESSIONS[name].cost for name in sorted(SESSIONS)])
+    return chosen
 
 
 def switched_on(random: Random) -> list[str]:

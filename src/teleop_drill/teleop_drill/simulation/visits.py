@@ -57,12 +57,14 @@ class SessionKind:
         texts: Values of parameters.
         has_circle: Whether the hand moves on the circle of the drill.
         is_visited: Whether the program of this module runs beside it.
+        cost: Processor time beside that of a plain session; a search runs it so much less often.
     """
 
     scenario: str = "free_motion"
     texts: tuple[str, ...] = ()
     has_circle: bool = True
     is_visited: bool = True
+    cost: float = 1.0
 
 
 _SCRIPT = "pause@6, resume@7, stop@9, reset@9.5, enable@9.6"
@@ -71,7 +73,7 @@ SESSIONS = {
     "visited": SessionKind(),
     "network": SessionKind(texts=("teleop.stages=[network,display]", "network.there.least_delay=0.05")),
     "task": SessionKind("point", (f"slave.operation.events=[{_SCRIPT}]",), has_circle=False),
-    "pair": SessionKind("uva_board", has_circle=False),
+    "pair": SessionKind("uva_board", has_circle=False, cost=5.0),
     "person": SessionKind(texts=("operator.kind=remote", "slave.start_speed=1.0"), has_circle=False),
 }
 """Kinds of sessions, by name."""
