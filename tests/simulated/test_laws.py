@@ -92,6 +92,12 @@ def test_a_press_counts_from_the_time_at_which_the_slave_can_hear_it() -> None:
     assert found.sometimes[UNKNOWN_STOP]
 
 
+@pytest.mark.slow
+def test_a_press_that_is_on_the_way_when_a_delay_ends_is_waited_for() -> None:
+    faults = (Fault(3.27, "delay", "teleop_session", 1.239, 0.961), Fault(4.269, "press", "", 0.392, 0.153))
+    assert run_seed(830008, faults, None, Processes.ONE, 0.0005).broken == ()
+
+
 def test_each_law_has_a_mutant_that_breaks_it() -> None:
     assert set(FOUND_BY_LAWS) == set(LAWS)
 

@@ -145,6 +145,8 @@ class Laws:
         self._press: tuple[int, bool] | None = None
         """Newest press that is not yet in force: number of the button, and whether the press was sent to the slave."""
         self._obey_by, self._was_idle, self._was_driven = 0.0, False, False
+        self._latest, self._late_until_ns = 0.0, 0
+        """Longest present delay [s], and the time until which it holds after its cause has ended [ns]."""
         self._presses = 0
         self._drive_ns, self._driven_at, self._followed_ns, self._stamp_ns = 0, 0.0, 0, 0
         self._leader = b""
@@ -281,7 +283,7 @@ class Laws:
 
     def _look(self) -> None:
         self._scheduler.at(self._scheduler.now_ns + _LOOK_NS, self._look)
-        stage = self._stage
+        stage, late = self._stage, self._late()
         slave, process = stage.session.node("slave"), stage.session.process_of("slave")
         if process is not self._process:  # the reports of the former process do not describe this process
             self._process, stage.operation = process, {}
@@ -297,7 +299,7 @@ class Laws:
         elif works and process is not None:
             self._worked += 1e-9 * _LOOK_NS
             silence = 1e-9 * (self._scheduler.now_ns - self._owner.followed_ns)
-            self._changes.judge(slave, self._worked, self._late(), silence)
+            self._changes.judge(slave, self._worked, late, silence)
             self._judge_state(slave)
             self._judge_stop(slave, process)
         self._judge_ends()
@@ -365,12 +367,15 @@ class Laws:
             self._break("stop", f"no stop is in force, although {since} long enough ago")
 
     def _late(self) -> float:
-        """Delay that bad lines and busy processors of the machine may add [s]."""
+        """Delay that bad lines and busy processors of the machine may add [s], to what is still on the way too."""
         lines = self._stage.bus.lines.values()
         on_the_way = max((line.delay + 20.0 * line.jitter for line in lines), default=0.0)
         lost = 0.2 * any(line.loss for line in lines)
         slow_ns = max(process.slow_ns for process in self._stage.session.running.values())
-        return on_the_way + lost + 20e-9 * (self._scheduler.costs.crowd_ns + slow_ns) + 0.05
+        late = on_the_way + lost + 20e-9 * (self._scheduler.costs.crowd_ns + slow_ns) + 0.05
+        if late >= self._latest or self._scheduler.now_ns > self._late_until_ns:
+            self._latest, self._late_until_ns = late, self._scheduler.now_ns + round(1e9 * late)
+        return self._latest
 
     def _judge_ends(self) -> None:
         """Check that no process ends without an order to end."""
