@@ -2,12 +2,14 @@
 
 import sys
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from functools import partial
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 import pytest
 from numba.core import runtime
 
+from teleop_core.base.workers import apart
 from teleop_core.kernels import IS_COMPILED, Array, inner, kernel
 
 pytestmark = pytest.mark.skipif(not IS_COMPILED, reason="looks at compiled code")
@@ -111,19 +113,21 @@ def test_calls_leave_their_arguments_with_the_holders_that_they_had(function: Ca
 
 @pytest.mark.parametrize("function", [looks, makes, adds, picks, hands_on])
 def test_arrays_that_a_kernel_makes_are_freed(function: Callable[[Arm], object]) -> None:
-    own = arm()
-    function(own)
-    memory: Any = runtime
-    was_on = memory._nrt_python.memsys_stats_enabled()
+    function(arm())
+    alloc, free, mi_alloc, mi_free = apart(partial(counted, function))  # where no thread of another test allocates
+    assert alloc == free
+    assert mi_alloc == mi_free
+
+
+def counted(function: Callable[[Arm], object]) -> list[int]:
+    """Numbers of blocks and arrays that fifty calls allocate and free."""
+    own, memory = arm(), cast(Any, runtime)
     memory._nrt_python.memsys_enable_stats()
     before = memory.rtsys.get_allocation_stats()
     for _ in range(50):
         function(own)
     after = memory.rtsys.get_allocation_stats()
-    if not was_on:
-        memory._nrt_python.memsys_disable_stats()
-    assert after.alloc - before.alloc == after.free - before.free
-    assert after.mi_alloc - before.mi_alloc == after.mi_free - before.mi_free
+    return [getattr(after, name) - getattr(before, name) for name in ("alloc", "free", "mi_alloc", "mi_free")]
 
 
 def test_an_array_that_was_handed_through_outlives_the_call() -> None:
