@@ -93,8 +93,8 @@ class DrilledSession:
         self._publishers: dict[str, Any] = {}
         self.sometimes: Counter[str] = Counter()
         """How often each event of :mod:`sometimes` was met."""
-        self.is_alone = True
-        """Whether nobody but the drill and the session sends commands."""
+        self.is_alone, self.is_scripted = True, bool(configuration.groups["slave"].operation.events)
+        """Whether nobody but the drill and the session sends commands, and whether the session does by itself."""
         self.asked: list[str] = []
         """Commands that were sent, in their order."""
         self.driven_ns = 0

@@ -30,7 +30,7 @@ from teleop_drill.simulation.steps import StepReader
 
 _LOOK_NS = 5_000_000
 _BAD = ("error", "fatal")
-_NO_DISK = "cannot be written"
+_NO_DISK = re.compile("cannot be (written|finished)")
 _SAFE = re.compile(r"the first [\d.]+ s \((\d+) of \d+ messages\)")
 _SLACK = 1e-6
 _CURVED = 1e-2
@@ -321,7 +321,7 @@ class Laws:
         if self._has_moved and (is_undriven or (state != State.ENABLED and in_force > self._braking + 0.2)):
             self._has_moved = False
             self._judge_speed()
-        moves = self._worked - self._moved_at < 1e-9 * _LOOK_NS
+        moves = self._worked - self._moved_at < 0.5e-9 * _LOOK_NS  # since the last look
         is_moving = moves and state != State.ENABLED and in_force > self._braking + 0.3
         # A setpoint that goes to an arm whose position was unknown is no motion of the arm.
         self._in_motion = self._in_motion + 1 if is_moving and not slave.stage.state["must_join"] else 0
@@ -384,7 +384,7 @@ class Laws:
             if process.is_dead and process not in self._stage.killed:
                 self._stage.killed.add(process)
                 said = [one.text for one in self._stage.machine.log if one.level in _BAD]
-                if process in self._stage.lost_disk and _NO_DISK in "".join(said[-1:]):
+                if process in self._stage.lost_disk and _NO_DISK.search("".join(said[-1:])):
                     self.lost_recorders.add(process)
                     self._stage.sometimes[sometimes.DISK_ENDS] += 1
                     continue  # the saved messages are checked at the end of the session

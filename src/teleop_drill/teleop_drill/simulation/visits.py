@@ -85,6 +85,7 @@ _READ = (*STREAMS, GOAL_JS, GOAL_CP, MEASURED_CV, BODY_CF, SPATIAL_CF, MARKERS)
 _OTHERWISE = (
     SLAVE_MEASURED_CF, OPERATOR_SERVO_CP, MASTER_SERVO_CF, SLAVE_OPERATION, DIAGNOSTICS,
 )  # fmt: skip
+_AGAIN_NS = 300_000_000  # time between two tries to bring the master back [ns]
 _RECORDER = ("start", "stop", "split", "mark")
 _JOINTS = tuple(f"other_{k}" for k in range(6))
 
@@ -122,6 +123,9 @@ class Visitor:
         monotonic_ns, next_ns = self._platform.monotonic_ns, 0
         while True:
             self.listen()
+            if not self.may_act and next_ns and monotonic_ns() >= next_ns:
+                next_ns = monotonic_ns() + _AGAIN_NS
+                self._enable_master()
             if self.may_act and monotonic_ns() >= next_ns:
                 next_ns = monotonic_ns() + round(1e9 * self._random.expovariate(1.0 / _REST))
                 (act,) = self._random.choices([one for one, _ in acts], [weight for _, weight in acts])
@@ -142,6 +146,12 @@ class Visitor:
             request = ChangeState.Request()
             request.transition.label = label
             client.call_async(request)
+
+    def _enable_master(self) -> None:
+        """Bring the master back, as an operator does who finds that the program has disabled it."""
+        if is_installed():
+            for word in ("reset", "enable"):
+                self._publish("master/state_command", STATE_COMMAND, message_type(STATE_COMMAND)(string=word))
 
     # -- what a hand and a client do -------------------------------------------------------------
 
