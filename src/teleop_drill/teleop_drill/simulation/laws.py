@@ -140,7 +140,6 @@ class Laws:
         """Time for which the slave's process has run [s]; time in which it was stopped does not count."""
         self._seen_state, self._since = -1, 0.0
         self._offset_ns = self._stepped_ns = self._old = 0
-        self._resting_since: float | None = None
         self._moved_at, self._in_motion = 0.0, 0
         self._press: tuple[int, bool] | None = None
         """Newest press that is not yet in force: number of the button, and whether the press was sent to the slave."""
